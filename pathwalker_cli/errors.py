@@ -1,0 +1,60 @@
+"""The exception tree: every error says what is wrong, where, what is allowed and how to mend it."""
+
+from __future__ import annotations
+
+__all__ = [
+    "BackendError",
+    "ConfigError",
+    "DataError",
+    "InputError",
+    "NotConvergedError",
+    "PatientError",
+    "PathwalkerError",
+]
+
+
+class PathwalkerError(Exception):
+    """Root of all errors that PathWalker raises on purpose."""
+
+
+class InputError(PathwalkerError):
+    """Something the user handed in is wrong; the command line exits with code 2.
+
+    Args:
+        what: What is wrong, one clause.
+        where: File, key, trial or frame at which it is wrong.
+        allowed: What would be accepted.
+        mend: What to do about it.
+    """
+
+    def __init__(self, what: str, *, where: str = "", allowed: str = "", mend: str = "") -> None:
+        self.what = what
+        self.where = where
+        self.allowed = allowed
+        self.mend = mend
+        parts = [f"{where}: {what}" if where else what]
+        if allowed:
+            parts.append(f"allowed: {allowed}")
+        if mend:
+            parts.append(mend)
+        super().__init__("; ".join(parts))
+
+
+class ConfigError(InputError):
+    """A study's YAML file or a command-line override is wrong."""
+
+
+class PatientError(InputError):
+    """A patient's file is wrong or lacks what the task needs."""
+
+
+class DataError(InputError):
+    """A recording, a table or a run folder cannot be used."""
+
+
+class NotConvergedError(PathwalkerError):
+    """A solution that did not converge was asked for its numbers; the command line exits with 1."""
+
+
+class BackendError(PathwalkerError):
+    """A dynamics back end is missing or does not fit the installed libraries."""

@@ -1,0 +1,1 @@
+"""From recordings to joint angles, ground forces, joint torques and strengths."""

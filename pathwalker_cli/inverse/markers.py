@@ -1,0 +1,107 @@
+"""Where the markers of a recording sit on the walker's links."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final
+
+from pydantic import model_validator
+
+from pathwalker_cli.conventions import Condition
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
+from pathwalker_cli.io.yaml_file import load_yaml
+from pathwalker_cli.model.anthropometry import segments
+from pathwalker_cli.paths import shipped
+from pathwalker_cli.patient import Patient
+
+__all__ = ["MarkerPoint", "MarkerSet", "load_marker_set", "marker_points"]
+
+Offset = Annotated[float, Quantity("m", -1.0, 1.0, *["is it in millimetres?"] * 2)]
+
+_LINKS: Final = ("pelvis", "trunk", "thigh_r", "shank_r", "foot_r", "thigh_l", "shank_l", "foot_l")
+
+
+@dataclass(frozen=True)
+class MarkerPoint:
+    """A point of the walker that a marker was attached to.
+
+    Args:
+        marker: Name of the marker in the recording.
+        link: Link it moves with.
+        position: Forward and up in the link's frame [m].
+        weight: Weight of its squared distance in the fit.
+    """
+
+    marker: str
+    link: str
+    position: tuple[float, float]
+    weight: float
+
+    @property
+    def name(self) -> str:
+        """Marker and link, for tables: "RANK on foot_r"."""
+        return f"{self.marker} on {self.link}"
+
+
+class MarkerEntry(YamlModel):
+    """One line of the marker set: a marker, its link, and `at` or `along`."""
+
+    marker: str
+    link: str
+    at: Annotated[tuple[Offset, Offset], AS_TUPLE] | None = None
+    along: Annotated[float, Quantity("", -1.0, 2.0)] | None = None
+    weight: Annotated[float, Quantity("", 0.0, 1000.0)] = 1.0
+
+    @model_validator(mode="after")
+    def _placed(self) -> MarkerEntry:
+        if self.link not in _LINKS:
+            raise invalid(f"has marker {self.marker} on '{self.link}'", allowed=", ".join(_LINKS))
+        if (self.at is None) == (self.along is None):
+            raise invalid(
+                f"does not say where {self.marker} sits",
+                allowed="either at: [forward, up] in m or along: share of the segment's length",
+            )
+        return self
+
+
+class MarkerSet(YamlModel):
+    """Marker sets of both conditions."""
+
+    reference_height: Annotated[float, Quantity("m", 0.5, 2.2, above="is it in centimetres?")]
+    both: list[MarkerEntry]
+    barefoot: list[MarkerEntry] = []
+    orthosis: list[MarkerEntry] = []
+
+
+def load_marker_set(path: str | Path | None = None) -> MarkerSet:
+    """Read a marker set; the shipped one if no file is given.
+
+    Raises:
+        ConfigError: If the file is refused.
+    """
+    return load_yaml(path or shipped("configs") / "markers.yaml", MarkerSet, ConfigError)
+
+
+def marker_points(
+    marker_set: MarkerSet, patient: Patient, condition: Condition
+) -> tuple[MarkerPoint, ...]:
+    """Return the points of a patient's walker that the markers were attached to."""
+    lengths = {segment.name: segment.length for segment in segments(patient, "barefoot")}
+    scale = patient.height / marker_set.reference_height
+    entries = [*marker_set.both, *getattr(marker_set, condition)]
+    return tuple(
+        MarkerPoint(entry.marker, entry.link, _position(entry, lengths, scale), entry.weight)
+        for entry in entries
+    )
+
+
+def _position(entry: MarkerEntry, lengths: dict[str, float], scale: float) -> tuple[float, float]:
+    """Return where a marker sits in its link's frame [m]."""
+    if entry.at is not None:
+        return entry.at[0] * scale, entry.at[1] * scale
+    distance = (entry.along or 0.0) * lengths[entry.link]
+    if entry.link.startswith("foot"):
+        return distance, 0.0
+    return 0.0, distance if entry.link == "trunk" else -distance

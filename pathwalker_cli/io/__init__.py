@@ -1,0 +1,1 @@
+"""Files in and out: YAML, C3D, CSV; readers and writers exchange dataclasses only."""

@@ -1,0 +1,219 @@
+"""Segment masses, centres of mass and inertias of a child after Jensen (1986).
+
+Every segment stands in its own link frame: x forward, z up in the zero pose, origin at the joint
+that connects it to its parent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+from pathwalker_cli.conventions import SIDES, SUFFIX, Condition
+
+if TYPE_CHECKING:
+    from pathwalker_cli.patient import Patient
+
+__all__ = ["JENSEN", "Line", "Regression", "Segment", "segments", "total_mass"]
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight line over age: value = intercept + slope * age [years]."""
+
+    intercept: float
+    slope: float
+
+    def at(self, age: float) -> float:
+        """Return the value at an age [years]."""
+        return self.intercept + self.slope * age
+
+
+@dataclass(frozen=True)
+class Regression:
+    """Jensen's lines of one segment.
+
+    Args:
+        mass: Fraction of body mass.
+        com: Distance of the centre of mass from the proximal end, fraction of segment length.
+        gyration: Radius of gyration about the proximal end, fraction of segment length.
+    """
+
+    mass: Line
+    com: Line
+    gyration: Line
+
+
+JENSEN: Final = MappingProxyType(
+    {
+        "head": Regression(Line(0.2376, -0.0114), Line(0.4833, 0.0025), Line(0.5748, 0.0021)),
+        "trunk": Regression(Line(0.4246, -0.0006), Line(0.5087, 0.0018), Line(0.5872, 0.00136)),
+        "upper_arm": Regression(
+            Line(0.0220, 0.00084), Line(0.5570, -0.00028), Line(0.64, -0.00098)
+        ),
+        "lower_arm": Regression(
+            Line(0.01469, 0.00018), Line(0.5610, 0.0019), Line(0.6327, 0.00135)
+        ),
+        "hand": Regression(Line(0.00898, -0.00003), Line(0.6005, 0.00019), Line(0.6373, 0.00048)),
+        "thigh": Regression(Line(0.06634, 0.00364), Line(0.4758, -0.00115), Line(0.5536, -0.00133)),
+        "shank": Regression(Line(0.03809, 0.00122), Line(0.4526, -0.0030), Line(0.5307, -0.00224)),
+        "foot": Regression(Line(0.0187, 0.00015), Line(0.4351, -0.00186), Line(0.5023, -0.00205)),
+    }
+)
+"""Regressions of boys, dimensionless over age in years.
+
+Head mass and centre of mass are confirmed by a printed table of Jensen's article; the others were
+identified from the published model, whose masses, centres of mass and inertias they reproduce to
+the printed digit.  Of lower arm, hand and foot gyration several neighbouring values do so.
+
+References:
+    Jensen (1986), Body segment mass, radius and radius of gyration proportions of children,
+    J. Biomech. 19(5):359-368.
+    Sreenivasa et al. (2017), doi 10.3389/fncom.2017.00023 (the published model).
+"""
+
+TRUNK_SHARE: Final = MappingProxyType({"pelvis": 0.4, "trunk": 0.6})
+"""Share of Jensen's trunk mass that goes to pelvis and upper trunk in the published model."""
+
+SAGITTAL_RATIO: Final = MappingProxyType({"pelvis": 0.55088, "trunk": 0.750793})
+"""Iyy / Ixx of pelvis and upper trunk in the published model (their source is unknown).
+
+For these two the regression gives the inertia about the forward axis x, for all others Iyy."""
+
+LONGITUDINAL_RATIO: Final = 0.1
+"""Moment of inertia of a limb about its long axis, as a share of that across it.
+
+A uniform cylinder five and a half times as long as its radius has this ratio; in the sagittal
+plane it acts on nothing."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A rigid segment and how it hangs on its parent.
+
+    Args:
+        name: Link name.
+        parent: Name of the parent link, "" for the pelvis.
+        joint: Coordinate between the two, or "" if they are welded.
+        origin: Origin of the link frame in the parent's frame (x, y, z) [m].
+        length: Segment length [m].
+        mass: Mass [kg].
+        com: Centre of mass in the link frame (x, y, z) [m].
+        inertia: Moments of inertia (Ixx, Iyy, Izz) about the centre of mass [kg m^2].
+    """
+
+    name: str
+    parent: str
+    joint: str
+    origin: Vector
+    length: float
+    mass: float
+    com: Vector
+    inertia: Vector
+
+
+def segments(
+    patient: Patient, condition: Condition, published: bool = False
+) -> tuple[Segment, ...]:
+    """Return the segments of a patient, parents before children.
+
+    Args:
+        patient: The patient.
+        condition: "barefoot", or "orthosis" with its mass added to shank and foot.
+        published: Hang the right lower arm and hand where the published model has them: at the
+            length of the segment itself below its parent's origin instead of at the parent's.
+    """
+    axial = (
+        _segment(patient, "pelvis", -1, parent="", origin=(0.0, 0.0, 0.0)),
+        _segment(
+            patient, "trunk", 1, "pelvis", (0.0, 0.0, patient.length("lumbar_height")), "lumbar"
+        ),
+        _segment(patient, "head", 1, "trunk", (0.0, 0.0, patient.length("trunk"))),
+    )
+    legs = tuple(s for side in SIDES for s in _leg(patient, side, condition))
+    arms = tuple(s for side in SIDES for s in _arm(patient, side, published and side == "right"))
+    return (axial[0], *legs, *axial[1:], *arms)
+
+
+def total_mass(parts: tuple[Segment, ...]) -> float:
+    """Return the mass of all segments together [kg]."""
+    return sum(part.mass for part in parts)
+
+
+def _leg(patient: Patient, side: str, condition: Condition) -> tuple[Segment, ...]:
+    """Return thigh, shank and foot of a side; an orthosis adds mass, and inertia in proportion."""
+    suffix = SUFFIX[side]
+    added = {"thigh": 0.0, "shank": 0.0, "foot": 0.0}
+    if condition == "orthosis":
+        mass = patient.require_orthosis().mass
+        added |= {"shank": mass.shank, "foot": mass.foot}
+    chain = (
+        ("thigh", "pelvis", "hip", patient.length("hip_drop")),
+        ("shank", f"thigh_{suffix}", "knee", patient.length("thigh", side)),
+        ("foot", f"shank_{suffix}", "ankle", patient.length("shank", side)),
+    )
+    return tuple(
+        _segment(
+            patient, name, -1, parent, (0.0, 0.0, -drop), f"{joint}_{suffix}", side, added[name]
+        )
+        for name, parent, joint, drop in chain
+    )
+
+
+def _arm(patient: Patient, side: str, misplaced: bool) -> tuple[Segment, ...]:
+    """Return upper arm, lower arm and hand of a side, welded in line."""
+    suffix = SUFFIX[side]
+    elbow, wrist = ("lower_arm", "hand") if misplaced else ("upper_arm", "lower_arm")
+    chain = (
+        ("upper_arm", "trunk", patient.length("shoulder_height", side)),
+        ("lower_arm", f"upper_arm_{suffix}", -patient.length(elbow, side)),
+        ("hand", f"lower_arm_{suffix}", -patient.length(wrist, side)),
+    )
+    return tuple(
+        _segment(patient, name, -1, parent, (0.0, 0.0, z), side=side) for name, parent, z in chain
+    )
+
+
+def _segment(
+    patient: Patient,
+    name: str,
+    direction: int,
+    parent: str,
+    origin: Vector,
+    joint: str = "",
+    side: str | None = None,
+    added_mass: float = 0.0,
+) -> Segment:
+    """Return one segment that extends up (1) or down (-1) from its origin, the foot forward."""
+    regression = JENSEN["trunk" if name in TRUNK_SHARE else name]
+    age = patient.regression_age
+    length = patient.length(name, side)
+    body = patient.body_mass * regression.mass.at(age) * TRUNK_SHARE.get(name, 1.0)
+    com, gyration = regression.com.at(age), regression.gyration.at(age)
+    across = body * length**2 * (gyration**2 - com**2) * (body + added_mass) / body
+    offset = com * length
+    return Segment(
+        name=f"{name}_{SUFFIX[side]}" if side else name,
+        parent=parent,
+        joint=joint,
+        origin=origin,
+        length=length,
+        mass=body + added_mass,
+        com=(offset, 0.0, 0.0) if name == "foot" else (0.0, 0.0, direction * offset),
+        inertia=_inertia(name, across),
+    )
+
+
+def _inertia(name: str, across: float) -> Vector:
+    """Return (Ixx, Iyy, Izz) from the moment of inertia across the segment [kg m^2].
+
+    Of pelvis and trunk, Izz is set equal to Iyy, which no body of these two moments contradicts.
+    """
+    if name in SAGITTAL_RATIO:
+        sagittal = SAGITTAL_RATIO[name] * across
+        return (across, sagittal, sagittal)
+    along = LONGITUDINAL_RATIO * across
+    return (along, across, across) if name == "foot" else (across, across, along)

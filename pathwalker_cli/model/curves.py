@@ -1,0 +1,146 @@
+"""C2 curves made of quintic Bezier corners, exact for NumPy and CasADi alike.
+
+A curve is a chain of knots (x, y, slope).  Two neighbours are joined by a quintic Bezier "corner"
+(Millard et al. 2013, appendix): the end tangents meet at C, and with the curviness c the control
+points are P0, A, A, B, B, P5, where A = P0 + c (C - P0) and B = P5 + c (C - P5).  Doubled control
+points make the curvature zero at every knot, so the chain is C2.  Outside the knots the curve goes
+on with its end slope.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+__all__ = ["BezierChain", "BezierPoint", "evaluate", "newton_steps_for"]
+
+_MOST_NEWTON_STEPS = 9
+"""Enough for 1e-14 on every corner in use; the flattest are the eccentric velocity curves."""
+
+
+@dataclass(frozen=True)
+class BezierChain:
+    """Knots of a chain of quintic Bezier corners; entries may be numbers or CasADi expressions.
+
+    Args:
+        x: Knot positions, increasing, n of them.
+        y: Knot values, n of them.
+        slopes: Slopes dy/dx at the knots, n of them.
+        curviness: Fraction c of the way from each end point to the corner, in (0, 1).
+        newton_steps: Newton steps for the curve parameter, see `newton_steps_for`.
+    """
+
+    x: Sequence[Any]
+    y: Sequence[Any]
+    slopes: Sequence[Any]
+    curviness: float
+    newton_steps: int = _MOST_NEWTON_STEPS
+
+    def corner(self, i: int) -> Any:
+        """Return the x at which the end tangents of piece i meet; its middle if they coincide."""
+        x0, x1 = self.x[i], self.x[i + 1]
+        turn = self.slopes[i] - self.slopes[i + 1]
+        straight = turn.is_zero() if isinstance(turn, ca.SX) else turn == 0
+        if straight:
+            return (x0 + x1) / 2
+        rise = self.y[i + 1] - self.y[i]
+        return (rise - x1 * self.slopes[i + 1] + x0 * self.slopes[i]) / turn
+
+    def controls(self, i: int) -> tuple[Any, Any]:
+        """Return the inner control points A and B of piece i, scaled to [0, 1]."""
+        x0, x1 = self.x[i], self.x[i + 1]
+        corner, c = self.corner(i), self.curviness
+        return c * (corner - x0) / (x1 - x0), 1 + c * (corner - x1) / (x1 - x0)
+
+
+@dataclass(frozen=True)
+class BezierPoint:
+    """Value and first two derivatives of a curve at x."""
+
+    value: Any
+    slope: Any
+    curvature: Any
+
+
+def evaluate(chain: BezierChain, x: Any) -> BezierPoint:
+    """Return y, dy/dx and d2y/dx2 on a chain of Bezier corners.
+
+    Args:
+        chain: The knots; numbers or CasADi expressions.
+        x: Where to evaluate; a NumPy array or a scalar CasADi expression.
+
+    Returns:
+        Value, slope and curvature, each shaped like x; exact to about 1e-14 of the knot values.
+    """
+    pieces = range(len(chain.x) - 1)
+    controls = [chain.controls(i) for i in pieces]
+    above, below = x > chain.x[-1], x < chain.x[0]
+    inside = 1 - above - below
+
+    def pick(values: Sequence[Any]) -> Any:
+        return _step_sum(x, chain.x[1:-1], values)
+
+    x0, width = pick(chain.x[:-1]), pick([chain.x[i + 1] - chain.x[i] for i in pieces])
+    y0, y5 = pick(chain.y[:-1]), pick(chain.y[1:])
+    s0, s5 = pick(chain.slopes[:-1]), pick(chain.slopes[1:])
+    a, b = pick([pair[0] for pair in controls]), pick([pair[1] for pair in controls])
+    # outside the knots the parameter stays at the end, where value and slope are the knot's
+    target = (x - x0) / width * inside + above
+    u = _invert(target, a, b, chain.newton_steps)
+    xs = _bernstein(u, 0, a, b, 1)
+    ys = _bernstein(u, y0, y0 + s0 * a * width, y5 - s5 * (1 - b) * width, y5)
+    slope = ys[1] / (xs[1] * width)
+    curvature = (ys[2] * xs[1] - ys[1] * xs[2]) / (xs[1] ** 3 * width**2) * inside
+    beyond = above * (x - chain.x[-1]) + below * (x - chain.x[0])
+    return BezierPoint(ys[0] + slope * beyond, slope, curvature)
+
+
+def newton_steps_for(chain: BezierChain, tolerance: float = 1e-14) -> int:
+    """Return the Newton steps after which x(u) meets its target on every piece of a chain."""
+    target = np.linspace(0.0, 1.0, 2001)
+    for steps in range(1, _MOST_NEWTON_STEPS):
+        error = 0.0
+        for i in range(len(chain.x) - 1):
+            a, b = chain.controls(i)
+            u = _invert(target, a, b, steps)
+            error = max(error, float(np.abs(_bernstein(u, 0, a, b, 1)[0] - target).max()))
+        if error < tolerance:
+            return steps
+    return _MOST_NEWTON_STEPS
+
+
+def _step_sum(x: Any, breaks: Sequence[Any], values: Sequence[Any]) -> Any:
+    """Return values[i] where breaks[i-1] <= x < breaks[i]: a sum of steps works for all types."""
+    result = values[0] + 0 * x
+    for edge, before, after in zip(breaks, values[:-1], values[1:], strict=True):
+        result = result + (x >= edge) * (after - before)
+    return result
+
+
+def _bernstein(u: Any, p0: Any, a: Any, b: Any, p5: Any) -> tuple[Any, Any, Any]:
+    """Return value and two u-derivatives of the quintic Bezier with points p0, a, a, b, b, p5."""
+    w = 1 - u
+    uu, ww, uw = u * u, w * w, u * w
+    value = (
+        p0 * ww * ww * w
+        + a * 5 * uw * ww * (w + 2 * u)
+        + b * 5 * uw * uu * (2 * w + u)
+        + p5 * uu * uu * u
+    )
+    first, middle, last = a - p0, b - a, p5 - b
+    rate = 5 * (first * ww * ww + 6 * middle * uw * uw + last * uu * uu)
+    bend = 20 * (-first * ww * w + 3 * middle * uw * (w - u) + last * uu * u)
+    return value, rate, bend
+
+
+def _invert(target: Any, a: Any, b: Any, steps: int) -> Any:
+    """Return u with x(u) = target on the scaled corner, by Newton's method."""
+    u = target
+    for _ in range(steps):
+        value, rate, _ = _bernstein(u, 0, a, b, 1)
+        u = u + (target - value) / rate
+    return u

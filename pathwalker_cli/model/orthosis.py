@@ -1,0 +1,92 @@
+"""The five-stage torque-angle curve of the ankle-foot orthosis, built from its stiffnesses.
+
+References:
+    Sreenivasa et al. (2017), figure 2 and table 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+from pathwalker_cli.model.curves import BezierChain, evaluate
+
+__all__ = ["OrthosisSide", "orthosis_curve", "orthosis_torque"]
+
+_CURVINESS: Final = 0.7
+_BLEND: Final = 0.1
+"""Part of the way from free play to hard stop over which spring and stop are blended."""
+
+
+@dataclass(frozen=True)
+class OrthosisSide:
+    """Fixed parameters of the orthosis on one side; angles + in plantarflexion.
+
+    Args:
+        neutral_angle: theta_0 [rad].
+        free_play: theta_W [rad], positive.
+        preload_torque: tau_0 [N m], positive.
+        dorsiflexion_stop: theta_DH [rad], below the free play.
+        plantarflexion_stop: theta_PH [rad], above the free play.
+        dorsiflexion_stop_stiffness: K_DH [N m/rad].
+        plantarflexion_stop_stiffness: K_PH [N m/rad].
+    """
+
+    neutral_angle: Any
+    free_play: Any
+    preload_torque: Any
+    dorsiflexion_stop: Any
+    plantarflexion_stop: Any
+    dorsiflexion_stop_stiffness: Any
+    plantarflexion_stop_stiffness: Any
+
+
+def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:
+    """Return the characteristic curve; the torque on the joint is its negative.
+
+    Args:
+        side: Fixed parameters.
+        k_d: Dorsiflexion stiffness K_D [N m/rad]; number or CasADi expression.
+        k_p: Plantarflexion stiffness K_P [N m/rad]; number or CasADi expression.
+
+    Returns:
+        Seven knots: stop, spring, edge of free play, neutral angle, and back again.
+    """
+    middle, play, preload = side.neutral_angle, side.free_play, side.preload_torque
+    reach_d = (middle - play / 2) - side.dorsiflexion_stop
+    reach_p = side.plantarflexion_stop - (middle + play / 2)
+    over_d = _BLEND * (preload + reach_d * k_d)
+    over_p = _BLEND * (preload + reach_p * k_p)
+    stop_d, stop_p = side.dorsiflexion_stop_stiffness, side.plantarflexion_stop_stiffness
+    x = [
+        side.dorsiflexion_stop - over_d / stop_d,
+        side.dorsiflexion_stop + _BLEND * reach_d,
+        middle - play,
+        middle,
+        middle + play,
+        side.plantarflexion_stop - _BLEND * reach_p,
+        side.plantarflexion_stop + over_p / stop_p,
+    ]
+    y = [
+        -preload - reach_d * k_d - over_d,
+        -preload - (1 - _BLEND) * reach_d * k_d,
+        -preload - play * k_d / 2,
+        0.0,
+        preload + play * k_p / 2,
+        preload + (1 - _BLEND) * reach_p * k_p,
+        preload + reach_p * k_p + over_p,
+    ]
+    slopes = [stop_d, k_d, k_d, 4 * preload / play, k_p, k_p, stop_p]
+    return BezierChain(x, y, slopes, _CURVINESS)
+
+
+def orthosis_torque(side: OrthosisSide, angle: Any, k_d: Any, k_p: Any) -> Any:
+    """Return the torque of the orthosis on the ankle [N m], restoring.
+
+    Args:
+        side: Fixed parameters.
+        angle: Ankle angle [rad], + plantarflexion; NumPy array or CasADi expression.
+        k_d: Dorsiflexion stiffness K_D [N m/rad].
+        k_p: Plantarflexion stiffness K_P [N m/rad].
+    """
+    return -evaluate(orthosis_curve(side, k_d, k_p), angle).value

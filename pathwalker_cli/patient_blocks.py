@@ -1,0 +1,240 @@
+"""The blocks of a patient's file: lengths, contact points, strengths, orthosis, recordings.
+
+SI units and radians; angles carry the signs of `conventions` (+ankle = plantarflexion).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field, field_validator, model_validator
+
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX
+from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
+
+__all__ = [
+    "AddedMass",
+    "ContactPoints",
+    "FootPoints",
+    "LengthRange",
+    "OrthosisData",
+    "Recorded",
+    "SegmentLengths",
+    "SpeedRange",
+    "SpringRange",
+    "Springs",
+    "Strengths",
+]
+
+Length = Annotated[float, Quantity("m", 0.005, 1.0, above="is it in centimetres or millimetres?")]
+Offset = Annotated[
+    float, Quantity("m", -0.4, 0.4, "is it in millimetres?", "is it in millimetres?")
+]
+Strength = Annotated[float, Quantity("N m", 0.1, 500.0)]
+Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
+Stiffness = Annotated[float, Quantity("N m/rad", 1.0, 1000.0, below="is it in N m per degree?")]
+Point = Annotated[tuple[Offset, Offset], AS_TUPLE]
+"""A point in the foot frame: [forward, up] of the ankle [m]."""
+
+
+class SegmentLengths(YamlModel):
+    """Segment lengths and joint offsets [m]; what is left out comes from body proportions.
+
+    `hip_drop` is how far the hips lie below the pelvis origin, `lumbar_height` how far the lumbar
+    joint lies above it, `shoulder_height` how far the shoulders lie above the lumbar joint.
+    `foot` reaches from the heel to the toe marker.
+    """
+
+    pelvis: Length | None = None
+    hip_drop: Length | None = None
+    lumbar_height: Length | None = None
+    trunk: Length | None = None
+    head: Length | None = None
+    shoulder_height: Sides[Length] | None = None
+    upper_arm: Sides[Length] | None = None
+    lower_arm: Sides[Length] | None = None
+    hand: Sides[Length] | None = None
+    thigh: Sides[Length] | None = None
+    shank: Sides[Length] | None = None
+    foot: Sides[Length] | None = None
+
+
+class FootPoints(YamlModel):
+    """Where one foot touches the ground: [x forward, z up] of the ankle [m] in the foot frame."""
+
+    heel: Point
+    toe: Point
+
+    @model_validator(mode="after")
+    def _toe_in_front(self) -> FootPoints:
+        if self.toe[0] <= self.heel[0]:
+            raise invalid(
+                f"has its toe at {self.toe[0]:g} m, behind its heel at {self.heel[0]:g} m",
+                allowed="toe in front of heel, both [x, z] with x forward",
+            )
+        for name, point in (("heel", self.heel), ("toe", self.toe)):
+            if point[1] >= 0.0:
+                raise invalid(
+                    f"has its {name} at height {point[1]:g} m",
+                    allowed="a negative height: the sole lies below the ankle",
+                )
+        return self
+
+
+class ContactPoints(YamlModel):
+    """Contact points per condition; those of the bare foot come from proportions if left out."""
+
+    barefoot: Sides[FootPoints] | None = None
+    orthosis: Sides[FootPoints] | None = None
+
+
+class Strengths(YamlModel):
+    """Maximum isometric torques of the muscle torque generators [N m]."""
+
+    hip_extension: Sides[Strength]
+    hip_flexion: Sides[Strength]
+    knee_extension: Sides[Strength]
+    knee_flexion: Sides[Strength]
+    ankle_extension: Sides[Strength]
+    ankle_flexion: Sides[Strength]
+    lumbar_extension: Strength
+    lumbar_flexion: Strength
+
+    def vector(self) -> tuple[float, ...]:
+        """Return the 14 torques [N m] in the order of `conventions.GENERATORS`."""
+        return tuple(self._of(name) for name in GENERATORS)
+
+    def _of(self, generator: str) -> float:
+        """Return the torque of a generator such as "hip_flexion_l"."""
+        name, _, suffix = generator.rpartition("_")
+        for side in SIDES:
+            if SUFFIX[side] == suffix:
+                return float(getattr(self, name)[side])
+        return float(getattr(self, generator))
+
+
+class AddedMass(YamlModel):
+    """What orthosis and shoe add to each leg [kg]."""
+
+    shank: Annotated[float, Quantity("kg", 0.0, 5.0, above="is it in grams?")]
+    foot: Annotated[float, Quantity("kg", 0.0, 5.0, above="is it in grams?")]
+
+
+class Springs(YamlModel):
+    """One stiffness per direction [N m/rad]."""
+
+    dorsiflexion: Stiffness
+    plantarflexion: Stiffness
+
+
+class SpringRange(YamlModel):
+    """Stiffness that the joint's springs can be tuned to [N m/rad], and who says so."""
+
+    dorsiflexion: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE]
+    plantarflexion: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE]
+    source: str = Field(min_length=1)
+
+
+class OrthosisData(YamlModel):
+    """Ankle-foot orthosis: geometry and springs, angles in rad (+ = plantarflexion)."""
+
+    mass: AddedMass
+    neutral_angle: Annotated[float, Quantity("rad", -0.6, 0.6, *["is it in degrees?"] * 2)]
+    free_play: Annotated[float, Quantity("rad", 1e-4, 0.2, above="is it in degrees?")]
+    preload_torque: Annotated[float, Quantity("N m", 0.0, 50.0, below="give its size, unsigned")]
+    dorsiflexion_stop: Sides[
+        Annotated[
+            float,
+            Quantity(
+                "rad",
+                -0.7,
+                -0.001,
+                "is it in degrees?",
+                "dorsiflexion angles are negative: give it a minus sign",
+            ),
+        ]
+    ]
+    plantarflexion_stop: Sides[
+        Annotated[
+            float,
+            Quantity("rad", 0.001, 0.7, "plantarflexion angles are positive", "is it in degrees?"),
+        ]
+    ]
+    stop_stiffness: Springs
+    stiffness_guess: Springs
+    stiffness_range: SpringRange
+
+    @model_validator(mode="after")
+    def _springs(self) -> OrthosisData:
+        for name in ("dorsiflexion", "plantarflexion"):
+            low, high = getattr(self.stiffness_range, name)
+            guess = getattr(self.stiffness_guess, name)
+            key = f"stiffness_range.{name}"
+            if low >= high:
+                raise invalid(f"has {key} [{low:g}, {high:g}], which is upside down or empty",
+                              allowed="[lower, upper] in N m/rad")  # fmt: skip
+            if not low <= guess <= high:
+                raise invalid(f"has stiffness_guess.{name} {guess:g} N m/rad outside its range",
+                              allowed=f"{low:g} to {high:g} N m/rad, the {key}")  # fmt: skip
+        return self
+
+    @model_validator(mode="after")
+    def _stops(self) -> OrthosisData:
+        half = self.free_play / 2.0
+        for side in SIDES:
+            low, high = self.dorsiflexion_stop[side], self.plantarflexion_stop[side]
+            if not low < self.neutral_angle - half < self.neutral_angle + half < high:
+                raise invalid(
+                    f"has neutral_angle {self.neutral_angle:g} rad with free_play "
+                    f"{self.free_play:g} rad, not between the {side} stops",
+                    allowed=f"between {low:g} and {high:g} rad",
+                )
+        return self
+
+
+Speed = Annotated[float, Quantity("m/s", 0.0, 5.0, above="is it in km/h or cm/s?")]
+
+
+class SpeedRange(YamlModel):
+    """Recorded walking speeds [m/s]."""
+
+    mean: Speed
+    min: Speed
+    max: Speed
+
+    @model_validator(mode="after")
+    def _ordered(self) -> SpeedRange:
+        if not self.min <= self.mean <= self.max:
+            raise invalid("is not in order", allowed="min <= mean <= max [m/s]")
+        return self
+
+
+class LengthRange(YamlModel):
+    """Recorded step lengths [m]."""
+
+    min: Annotated[float, Quantity("m", -0.5, 2.0, above="is it in centimetres?")]
+    max: Annotated[float, Quantity("m", -0.5, 2.0, above="is it in centimetres?")]
+
+    @model_validator(mode="after")
+    def _ordered(self) -> LengthRange:
+        if self.min > self.max:
+            raise invalid("is upside down", allowed="min <= max [m]")
+        return self
+
+
+class Recorded(YamlModel):
+    """What was recorded in one condition."""
+
+    walking_speed: SpeedRange
+    step_length: Sides[LengthRange]
+    joint_ranges: dict[str, Annotated[tuple[Angle, Angle], AS_TUPLE]]
+
+    @field_validator("joint_ranges")
+    @classmethod
+    def _known(cls, value: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+        for name, (low, high) in value.items():
+            if name not in COORDINATES[2:]:
+                raise invalid(f"names '{name}'", allowed=", ".join(COORDINATES[2:]))
+            if low > high:
+                raise invalid(f"has {name} upside down", allowed="[lowest, highest] in rad")
+        return value
