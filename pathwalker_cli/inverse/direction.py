@@ -10,13 +10,17 @@ import numpy as np
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.c3d import Recording
 
-__all__ = ["WalkingPlane", "walking_plane"]
+__all__ = ["WalkingPlane", "is_projected", "walking_plane"]
 
 _SHORTEST_WALK: Final = 0.3
 """Forward travel below which the direction is not certain [m]."""
 
 _LARGEST_DRIFT: Final = 0.35
 """Sideways travel per forward travel above which nobody walks along that axis."""
+
+
+_IN_PLANE: Final = 1e-6
+"""Sideways coordinate below which a marker lies in the plane [m]."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,15 @@ def walking_plane(recording: Recording, markers: tuple[str, ...]) -> WalkingPlan
             mend="turn the recording about the vertical first",
         )
     return WalkingPlane(axis, 1 if travel[axis] > 0 else -1)
+
+
+def is_projected(recording: Recording, plane: WalkingPlane, markers: tuple[str, ...]) -> bool:
+    """Return whether the markers were laid into the walking plane before they were stored.
+
+    Then they may have been turned as well, and say nothing about the laboratory's axes.
+    """
+    sideways = [recording.marker(name)[:, 1 - plane.axis] for name in markers]
+    return bool(np.nanmax(np.abs(sideways)) < _IN_PLANE)
 
 
 def _travel(positions: np.ndarray) -> np.ndarray:

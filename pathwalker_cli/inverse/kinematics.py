@@ -15,7 +15,7 @@ from pathwalker_cli.inverse.markers import MarkerPoint
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["MarkerResiduals", "inverse_kinematics"]
+__all__ = ["MarkerResiduals", "inverse_kinematics", "pelvis_markers"]
 
 TOLERANCE: Final = 1e-8
 """Largest step at which a frame counts as solved [m, rad]: far below what markers resolve."""
@@ -27,7 +27,7 @@ DAMPING: Final = 1e-3
 """Damping after a step that led uphill [m^2/rad^2]: a tenth of the lever of a foot, squared."""
 
 LARGEST_STEP: Final = 0.5
-"""Largest step of one iteration [m, rad]; keeps the first frame from turning a joint right round."""
+"""Largest step of one iteration [m, rad]; keeps the first frame from turning a joint round."""
 
 FLAT: Final = 1e-6
 """Smallest curvature that counts [m^2/rad^2]; a joint without markers stays where it is."""
@@ -79,7 +79,7 @@ def inverse_kinematics(
     Raises:
         DataError: If a marker is unknown, a frame shows too little, or the fit does not settle.
     """
-    plane = plane or walking_plane(recording, _pelvis_markers(points))
+    plane = plane or walking_plane(recording, pelvis_markers(points))
     names = tuple(point.marker for point in points)
     targets = plane.project(np.stack([recording.marker(name) for name in names], axis=1))
     fit = _Fit(model, points)
@@ -96,7 +96,7 @@ def inverse_kinematics(
     return trajectory, MarkerResiduals(tuple(point.name for point in points), distances)
 
 
-def _pelvis_markers(points: tuple[MarkerPoint, ...]) -> tuple[str, ...]:
+def pelvis_markers(points: tuple[MarkerPoint, ...]) -> tuple[str, ...]:
     """Return the markers on the pelvis, or all if there are none."""
     found = tuple(point.marker for point in points if point.link == "pelvis")
     return found or tuple(point.marker for point in points)

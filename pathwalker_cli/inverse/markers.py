@@ -70,9 +70,9 @@ class MarkerSet(YamlModel):
     """Marker sets of both conditions."""
 
     reference_height: Annotated[float, Quantity("m", 0.5, 2.2, above="is it in centimetres?")]
-    both: list[MarkerEntry]
-    barefoot: list[MarkerEntry] = []
-    orthosis: list[MarkerEntry] = []
+    both: tuple[MarkerEntry, ...]
+    barefoot: tuple[MarkerEntry, ...] = ()
+    orthosis: tuple[MarkerEntry, ...] = ()
 
 
 def load_marker_set(path: str | Path | None = None) -> MarkerSet:

@@ -178,9 +178,11 @@ def _positions(points: np.ndarray, unit: float) -> np.ndarray:
 def _events(parameters: Any, rate: float, first_frame: int, frames: int) -> tuple[Event, ...]:
     """Return strikes and toe-offs inside the recording; other events are left out.
 
-    The frame is ceil(t rate) - first_frame - 1, as in the published evaluation of the recordings.
+    C3D counts event times from frame 1 at time zero; an event between two frames counts for the
+    later one.  In the shipped recordings the plates' forces
+    rise and fall within one frame of the events read this way.
     """
-    group = parameters["EVENT"] if "EVENT" in parameters else {}
+    group = parameters.get("EVENT", {})
     if "TIMES" not in group or not np.size(group["TIMES"]["value"]):
         return ()
     minutes, seconds = group["TIMES"]["value"]
@@ -192,7 +194,7 @@ def _events(parameters: Any, rate: float, first_frame: int, frames: int) -> tupl
         strict=False,
     ):
         key_side, key_kind = str(side).strip().lower(), str(kind).strip().lower()
-        frame = math.ceil(round(float(time) * rate, 3)) - first_frame - 1
+        frame = math.ceil(round(float(time) * rate, 3)) - (first_frame - 1)
         if key_side in _SIDES and key_kind in _KINDS and 0 <= frame < frames:
             found.append(Event(_SIDES[key_side], _KINDS[key_kind], frame))
     return tuple(sorted(found, key=lambda event: event.frame))
@@ -229,7 +231,7 @@ def _analog(content: Any) -> np.ndarray:
 def _plates(content: Any, path: Path) -> tuple[ForcePlate, ...]:
     """Return the force plates; only Kistler plates of type 3 are read."""
     parameters = content["parameters"]
-    group = parameters["FORCE_PLATFORM"] if "FORCE_PLATFORM" in parameters else {}
+    group = parameters.get("FORCE_PLATFORM", {})
     count = int(group["USED"]["value"][0]) if "USED" in group and len(group["USED"]["value"]) else 0
     if not count or not content["data"]["analogs"].size:
         return ()

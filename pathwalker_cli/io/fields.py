@@ -65,7 +65,8 @@ class Quantity:
         if isinstance(value, bool) or not isinstance(value, int | float):
             unit = f" in {self.unit}" if self.unit else ""
             mend = f"write the number alone, the unit is always {self.unit}" if self.unit else ""
-            what = f"is {value!r}, which is not a number{unit}"
+            shown = "empty" if value is None else repr(value)
+            what = f"is {shown}, which is not a number{unit}"
             raise invalid(what, allowed=self.allowed, mend=mend)
         if self.lower <= value <= self.upper:
             return float(value)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import math
 import re
@@ -14,13 +13,11 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from pathwalker_cli.errors import ConfigError, InputError
+from pathwalker_cli.io.refusals import KeyPath, Lines, dotted, place, sentence
 
 __all__ = ["KeyPath", "Lines", "load_yaml", "read_mapping", "validate"]
 
 Model = TypeVar("Model", bound=BaseModel)
-KeyPath = tuple[str | int, ...]
-Lines = Mapping[KeyPath, int]
-"""Line number (from 1) of every key of a file."""
 
 
 class _Loader(yaml.SafeLoader):
@@ -116,12 +113,12 @@ def validate(
         raise error(f"holds a value of another kind: {problem}", where=where) from None
     except ValueError:
         key = _not_finite(mapping)
-        place = _place(where, key, lines or {})
-        raise error("is not a finite number", where=place, allowed="a finite number") from None
+        position = place(where, key, lines or {})
+        raise error("is not a finite number", where=position, allowed="a finite number") from None
     try:
         return model_class.model_validate_json(text, strict=True)
     except ValidationError as problem:
-        raise _sentence(problem, mapping, model_class, where, error, lines or {}) from None
+        raise sentence(problem, mapping, model_class, where, error, lines or {}) from None
 
 
 def _text(path: Path, error: type[InputError]) -> str:
@@ -166,14 +163,6 @@ def _lines(
     return lines
 
 
-def dotted(path: KeyPath) -> str:
-    """Return a key path as it is written in messages: "orthosis.stiffness_range[0]"."""
-    text = ""
-    for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
-    return text
-
-
 def _not_finite(value: Any, prefix: KeyPath = ()) -> KeyPath:
     """Return the path of the first number that is NaN or infinite."""
     items: Any = ()
@@ -188,86 +177,3 @@ def _not_finite(value: Any, prefix: KeyPath = ()) -> KeyPath:
         if found:
             return found
     return ()
-
-
-def _place(where: str, path: KeyPath, lines: Lines) -> str:
-    """Return "file, line 3: key" from what is known."""
-    line = lines.get(path) or lines.get(path[:-1])
-    origin = f"{where}, line {line}" if where and line else where
-    return ": ".join(part for part in (origin, dotted(path)) if part)
-
-
-def _sentence(
-    problem: ValidationError,
-    mapping: Mapping[str, Any],
-    model_class: type[BaseModel],
-    where: str,
-    error: type[InputError],
-    lines: Lines,
-) -> InputError:
-    """Turn pydantic's list of problems into one sentence; unknown keys come first."""
-    problems = sorted(problem.errors(), key=lambda item: item["type"] != "extra_forbidden")
-    first: Any = problems[0]
-    path = _path_in(mapping, first["loc"])
-    what, allowed, mend = _clauses(first, path, model_class)
-    others = sorted({dotted(_path_in(mapping, item["loc"])) for item in problems} - {dotted(path)})
-    if others:
-        mend = (
-            f"{mend + '; ' if mend else ''}also wrong: {', '.join(o or 'the file' for o in others)}"
-        )
-    return error(what, where=_place(where, path, lines), allowed=allowed, mend=mend)
-
-
-def _path_in(mapping: Any, location: tuple[str | int, ...]) -> KeyPath:
-    """Drop pydantic's own labels from a location: keep what leads somewhere in the data."""
-    path: list[str | int] = []
-    value = mapping
-    for position, part in enumerate(location):
-        inside = isinstance(value, Mapping) and part in value
-        if inside or (isinstance(value, list) and isinstance(part, int) and part < len(value)):
-            value = value[part]
-            path.append(part)
-        elif isinstance(value, Mapping) and position == len(location) - 1:
-            path.append(part)
-    return tuple(path)
-
-
-def _clauses(problem: Any, path: KeyPath, model_class: type[BaseModel]) -> tuple[str, str, str]:
-    """Return what is wrong, what is allowed and how to mend it."""
-    kind, context, value = problem["type"], problem.get("ctx", {}), problem["input"]
-    if kind == "pathwalker":
-        return context["what"], context["allowed"], context["mend"]
-    if kind == "extra_forbidden":
-        known = allowed_keys(model_class, problem["loc"][:-1])
-        close = difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0.5)
-        mend = f"did you mean '{close[0]}'?" if close else "remove it"
-        return "unknown key", ", ".join(known), mend
-    if kind == "missing":
-        keys = ", ".join(allowed_keys(model_class, problem["loc"][:-1]))
-        return "this key is missing", "", f"add it; keys here: {keys}"
-    shown = "a mapping" if isinstance(value, dict) else repr(value)
-    if kind == "value_error":
-        return str(context["error"]), "", ""
-    message = problem["msg"][0].lower() + problem["msg"][1:]
-    return f"is {shown}", message.removeprefix("input should be "), ""
-
-
-def allowed_keys(model_class: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
-    """Return the keys that a model takes at a location inside it."""
-    model: type[BaseModel] | None = model_class
-    for part in location:
-        field = model.model_fields.get(str(part)) if model else None
-        if field is not None:
-            model = _model_in(field.annotation)
-    return list(model.model_fields) if model else []
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """Return the first pydantic model inside an annotation such as `dict[str, X] | None`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for argument in getattr(annotation, "__args__", ()):
-        found = _model_in(argument)
-        if found is not None:
-            return found
-    return None

@@ -4,7 +4,7 @@ References:
     Anderson, D.E., Madigan, M.L., Nussbaum, M.A. (2007) J. Biomech. 40, 3105-3113, table 3.
     Thelen, D.G., Anderson, F.C., Delp, S.L. (2003) J. Biomech. 36, 321-328.
     Winters, J.M., Stark, L. (1988) J. Biomech. 21, 1027-1041.
-    Sreenivasa, M. et al. (2017) Front. Neurorobot. 11:23.
+    Sreenivasa, M. et al. (2017) Front. Comput. Neurosci. 11:23.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from pathwalker_cli.model.curves import BezierChain, evaluate
@@ -39,6 +39,11 @@ class OrthosisSide:
     plantarflexion_stop: Any
     dorsiflexion_stop_stiffness: Any
     plantarflexion_stop_stiffness: Any
+
+    def scaled(self, share: float) -> OrthosisSide:
+        """Return an orthosis whose preload and stops carry a share of the torque."""
+        names = ("preload_torque", "dorsiflexion_stop_stiffness", "plantarflexion_stop_stiffness")
+        return replace(self, **{name: share * getattr(self, name) for name in names})
 
 
 def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:

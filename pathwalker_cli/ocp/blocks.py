@@ -47,6 +47,11 @@ class Block:
         return int(self.constraints.numel())
 
     @property
+    def matters(self) -> bool:
+        """Whether the block has rows or adds to the objective."""
+        return bool(self.rows) or self.has_objective
+
+    @property
     def has_objective(self) -> bool:
         """Whether the block adds to the objective."""
         return not self.objective.is_zero()
@@ -96,6 +101,7 @@ class Occurrences:
         data: Numbers of each occurrence, shape (m, count).
         lower: Lower bounds of the rows, shape (r, count).
         upper: Upper bounds of the rows, shape (r, count).
+        row_scale: Physical units per row unit, shape (r,).
         row_names: Names of the rows, r of them.
         labels: Where each occurrence is, e.g. "left_flat at 40 %", count of them.
     """
@@ -105,6 +111,7 @@ class Occurrences:
     data: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
+    row_scale: np.ndarray
     row_names: Sequence[str]
     labels: Sequence[str]
 
@@ -127,7 +134,7 @@ class BlockProgram:
 
     def __init__(self, size: int, occurrences: Sequence[Occurrences], shared_size: int) -> None:
         self.size = size
-        self.occurrences = tuple(o for o in occurrences if o.count and (o.block.rows or o.block.has_objective))
+        self.occurrences = tuple(o for o in occurrences if o.count and o.block.matters)
         self.shared_size = shared_size
         self.lower = self._stack([o.lower for o in self.occurrences])
         self.upper = self._stack([o.upper for o in self.occurrences])
@@ -151,10 +158,20 @@ class BlockProgram:
 
     def row_name(self, row: int) -> str:
         """Return what a row of g is and where, e.g. "toe_l height in right_toe at 40 %"."""
+        name, where = self.row_place(row)
+        return f"{name} in {where}"
+
+    def row_place(self, row: int) -> tuple[str, str]:
+        """Return the name of a row of g and where it stands."""
         which = int(np.searchsorted(self._row_offsets, row, side="right")) - 1
         occurrence = self.occurrences[which]
         instance, local = divmod(row - self._row_offsets[which], occurrence.block.rows)
-        return f"{occurrence.row_names[local]} in {occurrence.labels[instance]}"
+        return occurrence.row_names[local], occurrence.labels[instance]
+
+    @property
+    def row_scale(self) -> np.ndarray:
+        """Physical units per unit of every row."""
+        return np.concatenate([np.tile(o.row_scale, o.count) for o in self.occurrences])
 
     def functions(self) -> dict[str, ca.Function]:
         """Return `nlp`, `grad_f`, `jac_g` and `hess_lag` in the form that `casadi.nlpsol` takes."""

@@ -308,6 +308,7 @@ class CollocationProgram:
             data.reshape(len(data), -1),
             lower,
             upper,
+            rows.scale,
             rows.names,
             [self._label(i, f) for f in fractions.ravel()],
         )
@@ -322,6 +323,7 @@ class CollocationProgram:
             data[:, -1, -1:],
             lower[:, None],
             upper[:, None],
+            phase.end.scale,
             phase.end.names,
             [self._label(i, 1.0)],
         )
@@ -345,12 +347,14 @@ class CollocationProgram:
         names += [f"{s} rate" for s in problem.smooth.names]
         names += [f"integral {s}" for s in problem.integrals]
         zeros = np.zeros((len(names), count))
+        tail = (problem.smooth.scale, problem.integral_scale)
         return Occurrences(
             self.blocks.phases[i].interval,
             np.array(columns).T,
             np.concatenate([np.diff(mesh)[None, :], points.T]),
             zeros,
             zeros,
+            np.concatenate([np.tile(problem.states.scale, d), *tail]),
             names,
             [self._label(i, f) for f in mesh[:-1]],
         )
@@ -369,6 +373,7 @@ class CollocationProgram:
             np.zeros((0, count)),
             np.tile(lower[:, None], count),
             np.tile(upper[:, None], count),
+            rows.scale,
             rows.names,
             labels,
         )
@@ -388,6 +393,7 @@ class CollocationProgram:
             np.zeros((0, 1)),
             lower[:, None],
             upper[:, None],
+            rows.scale,
             rows.names,
             ["the whole motion"],
         )

@@ -80,6 +80,7 @@ class Layout:
             put(places.algebraic, phase.algebraic.names, phase.name)
             put(places.algebraic[-1, -1], phase.algebraic.names, phase.name, end=True)
         put(self.states[0], problem.states.names, "first")
+        put(self.integrals, problem.integrals)
         lower[self.integrals[0]] = upper[self.integrals[0]] = 0.0
         return lower / self.scale, upper / self.scale
 

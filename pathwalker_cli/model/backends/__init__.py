@@ -102,12 +102,12 @@ def rigid_body_functions(
     nonzero = tuple((parameters != 0.0).tolist())
     values = parameters[np.array(nonzero, dtype=bool)]
     values.setflags(write=False)
-    names = topology.parameter_names
+    named = zip(topology.parameter_names, nonzero, strict=True)
     return RigidBodyFunctions(
         backend=name,
         nq=model.nq,
         parameters=values,
-        parameter_names=tuple(name for name, kept in zip(names, nonzero, strict=True) if kept),
+        parameter_names=tuple(parameter for parameter, kept in named if kept),
         topology=topology,
         **_folded(name, topology, nonzero),
     )

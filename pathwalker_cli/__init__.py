@@ -1,0 +1,30 @@
+"""PathWalker predicts gait and identifies ankle-foot orthosis stiffness by optimal control."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from pathwalker_cli.model.walker import build_walker
+    from pathwalker_cli.patient import load_patient
+
+__all__ = ["__version__", "build_walker", "load_patient"]
+
+_HOMES = {
+    "build_walker": "pathwalker_cli.model.walker",
+    "load_patient": "pathwalker_cli.patient",
+}
+
+try:
+    __version__ = version("pathwalker-cli")
+except PackageNotFoundError:  # used from a checkout that is not installed
+    __version__ = "0+unknown"
+
+
+def __getattr__(name: str) -> Any:
+    """Import the public functions when they are first used: the command line must start fast."""
+    if name in _HOMES:
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

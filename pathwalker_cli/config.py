@@ -1,0 +1,278 @@
+"""Study configs: YAML in, validated frozen models out; every numerical choice has its place here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from pathwalker_cli.conventions import COORDINATES, Condition
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
+from pathwalker_cli.io.yaml_file import read_mapping, validate
+from pathwalker_cli.model.contact import PHASE_NAMES
+from pathwalker_cli.paths import shipped
+from pathwalker_cli.patient_blocks import Stiffness
+
+__all__ = [
+    "PROBLEMS",
+    "BoundsConfig",
+    "CostConfig",
+    "MeshConfig",
+    "ModelConfig",
+    "SolverConfig",
+    "StartConfig",
+    "StudyConfig",
+    "condition_of",
+    "load_config",
+    "smoke_version",
+]
+
+PROBLEMS: Final[dict[str, Condition]] = {"mapd-orthosis": "orthosis", "mapd-barefoot": "barefoot"}
+"""Problems that can be solved and the condition each one is about."""
+
+Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
+Range = Annotated[tuple[Angle, Angle], AS_TUPLE]
+Seconds = Annotated[float, Quantity("s", 0.005, 2.0, above="is it in milliseconds?")]
+Weight = Annotated[float, Quantity("", 0.0, 1e6)]
+Share = Annotated[float, Quantity("", 0.0, 1.0)]
+Speed = Annotated[float, Quantity("m/s", 0.0, 3.0, above="is it in km/h or cm/s?")]
+
+
+def _ordered(value: tuple[float, float]) -> tuple[float, float]:
+    if value[0] > value[1]:
+        raise invalid(f"is [{value[0]:g}, {value[1]:g}], upside down", allowed="[lower, upper]")
+    return value
+
+
+class ModelConfig(YamlModel):
+    """Which model is built."""
+
+    backend: Literal["auto", "pinocchio.casadi", "compiled", "direct"] = "auto"
+    published: bool = False
+
+
+class CostConfig(YamlModel):
+    """Weights of the cost terms."""
+
+    effort_weight: Weight = 1.0
+    rate_weight: Weight = 1e-3
+    acceleration_weight: Weight = 0.0
+    walking_speed_weight: Weight = 0.0
+
+
+class BoundsConfig(YamlModel):
+    """Bounds of the prediction; they decide the answer as much as the cost does."""
+
+    joint_range_margin: Annotated[float, Quantity("rad", 0.0, 1.5, above="is it in degrees?")] = 0.2
+    joint_ranges: dict[str, Range] = Field(default_factory=dict)
+    fallback_joint_ranges: dict[str, Range] = Field(
+        default_factory=lambda: {
+            "pelvis_tilt": (-0.5, 0.4),
+            "hip_r": (-1.25, 0.55),
+            "knee_r": (0.25, 1.6),
+            "ankle_r": (-0.7, 0.3),
+            "hip_l": (-1.25, 0.55),
+            "knee_l": (0.25, 1.6),
+            "ankle_l": (-0.7, 0.3),
+            "lumbar": (-0.25, 0.85),
+        }
+    )
+    least_walking_speed: Literal["recorded"] | Speed = "recorded"
+    fallback_speed_ratio: Annotated[float, Quantity("", 0.0, 1.0)] = 0.25
+    phase_duration: Annotated[tuple[Seconds, Seconds], AS_TUPLE] = (0.02, 0.45)
+    phase_durations: dict[str, Annotated[tuple[Seconds, Seconds], AS_TUPLE]] = Field(
+        default_factory=dict
+    )
+    distance: Annotated[tuple[float, float], AS_TUPLE] = (0.3, 3.0)
+    joint_speed: Annotated[float, Quantity("rad/s", 1.0, 100.0)] = 30.0
+    dorsiflexion_stiffness: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE] | None = None
+    plantarflexion_stiffness: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE] | None = None
+    friction: Annotated[float, Quantity("", 0.05, 2.0)] = 0.8
+    least_vertical_force: Annotated[float, Quantity("N", 0.0, 50.0)] = 0.0
+
+    @field_validator("joint_ranges", "fallback_joint_ranges")
+    @classmethod
+    def _coordinates(cls, value: dict[str, Range]) -> dict[str, Range]:
+        for name, pair in value.items():
+            if name not in COORDINATES[2:]:
+                raise invalid(f"names '{name}'", allowed=", ".join(COORDINATES[2:]))
+            _ordered(pair)
+        return value
+
+    @field_validator("phase_durations")
+    @classmethod
+    def _phases(cls, value: dict[str, Any]) -> dict[str, Any]:
+        for name, pair in value.items():
+            if name not in PHASE_NAMES:
+                raise invalid(f"names '{name}'", allowed=", ".join(PHASE_NAMES))
+            _ordered(pair)
+        return value
+
+    @field_validator(
+        "phase_duration", "distance", "dorsiflexion_stiffness", "plantarflexion_stiffness"
+    )
+    @classmethod
+    def _pairs(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
+        return value if value is None else _ordered(value)
+
+
+class MeshConfig(YamlModel):
+    """Mesh intervals and the accuracy that they must reach."""
+
+    degree: Annotated[int, Field(ge=2, le=6)] = 3
+    start_intervals_per_phase: Annotated[int, Field(ge=2, le=50)] = 4
+    intervals: Annotated[int, Field(ge=0, le=1000)] = 64
+    least_intervals_per_phase: Annotated[int, Field(ge=1, le=50)] = 3
+    position_tolerance: Annotated[float, Quantity("rad or m", 1e-8, 1.0)] = 1e-3
+    velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2
+    refinements: Annotated[int, Field(ge=0, le=20)] = 5
+
+
+class StartConfig(YamlModel):
+    """Where the search begins."""
+
+    gait: Literal["synthetic", "recorded"] = "synthetic"
+    trial: str = ""
+    condition: Condition = "barefoot"
+    knee_flexion: Annotated[float, Quantity("rad", 0.05, 1.5, above="is it in degrees?")] = 0.7
+    stride_ratio: Annotated[float, Quantity("leg lengths", 0.3, 3.0)] = 1.1
+
+
+class SolverConfig(YamlModel):
+    """Tolerances and limits of the nonlinear solver."""
+
+    tolerance: Annotated[float, Quantity("", 1e-12, 1e-1)] = 1e-6
+    coarse_tolerance: Annotated[float, Quantity("", 1e-12, 1e-1)] = 1e-3
+    constraint_tolerance: Annotated[float, Quantity("", 1e-12, 1e-3)] = 1e-9
+    max_iterations: Annotated[int, Field(ge=1, le=100000)] = 1000
+    fine_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-4
+    ipopt: dict[str, float | int | str] = Field(default_factory=dict)
+
+
+class StudyConfig(YamlModel):
+    """One problem for one patient."""
+
+    problem: str
+    patient: str
+    model: ModelConfig = ModelConfig()
+    cost: CostConfig = CostConfig()
+    bounds: BoundsConfig = BoundsConfig()
+    mesh: MeshConfig = MeshConfig()
+    start: StartConfig = StartConfig()
+    solver: SolverConfig = SolverConfig()
+    smoke: bool = False
+
+    @field_validator("problem")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        if value not in PROBLEMS:
+            raise invalid(f"is '{value}'", allowed=", ".join(PROBLEMS))
+        return value
+
+    @model_validator(mode="after")
+    def _start(self) -> StudyConfig:
+        if self.start.trial and self.start.gait != "recorded":
+            raise invalid(
+                "names a start.trial but start.gait is synthetic",
+                mend="set start.gait to recorded, or leave start.trial out",
+            )
+        return self
+
+    @property
+    def condition(self) -> Condition:
+        """Condition that the problem is about."""
+        return PROBLEMS[self.problem]
+
+
+def condition_of(problem: str) -> Condition:
+    """Return the condition of a problem.
+
+    Raises:
+        ConfigError: If there is no such problem.
+    """
+    if problem not in PROBLEMS:
+        raise ConfigError(f"there is no problem '{problem}'", allowed=", ".join(PROBLEMS))
+    return PROBLEMS[problem]
+
+
+def load_config(
+    path: str | Path, problem: str = "", changes: tuple[str, ...] = ()
+) -> StudyConfig:
+    """Read a study config.
+
+    Args:
+        path: The YAML file, or the name of a shipped one, e.g. "mapd-orthosis".
+        problem: Problem that was asked for; it must be the config's own.
+        changes: Overrides "dotted.key=value", as from the command line.
+
+    Raises:
+        ConfigError: If file or overrides are wrong.
+    """
+    source = _find(Path(path))
+    mapping, lines = read_mapping(source, ConfigError)
+    for change in changes:
+        _apply(mapping, change)
+    config = validate(mapping, StudyConfig, where=str(path), error=ConfigError, lines=lines)
+    if problem and config.problem != problem:
+        raise ConfigError(
+            f"is a config for {config.problem}, but {problem} was asked for",
+            where=f"{path}, problem",
+            mend=f"use configs/{problem}.yaml, or ask for {config.problem}",
+        )
+    return config.model_copy(update={"patient": _patient_path(config.patient, source)})
+
+
+def _find(path: Path) -> Path:
+    """Return the file, or the shipped config of that name where there is no such file."""
+    if not path.exists():
+        for name in (path.name, f"{path.name}.yaml"):
+            candidate = shipped("configs") / name
+            if candidate.is_file() and path.parent.name in ("", "configs"):
+                return candidate
+    return path
+
+
+def _patient_path(patient: str, config_file: Path) -> str:
+    """Return a patient path relative to the config's folder as a full path; ids stay."""
+    candidate = config_file.parent / patient
+    return str(candidate.resolve()) if "/" in patient or candidate.is_file() else patient
+
+
+def _apply(mapping: dict[str, Any], change: str) -> None:
+    """Put one override "a.b=value" into a mapping; the value is read as YAML."""
+    import yaml
+
+    key, equals, text = change.partition("=")
+    if not equals or not key.strip():
+        raise ConfigError(f"'{change}' is no override", where="--set", allowed="dotted.key=value")
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise ConfigError(f"'{text}' is not a YAML value", where=f"--set {key}") from None
+    if isinstance(value, str):
+        value = _number(value)
+    *parents, last = key.strip().split(".")
+    for parent in parents:
+        mapping = mapping.setdefault(parent, {})
+        if not isinstance(mapping, dict):
+            raise ConfigError(f"'{parent}' holds no keys", where=f"--set {key}")
+    mapping[last] = value
+
+
+def _number(text: str) -> str | float:
+    """Return 1e-4 and the like as numbers: YAML 1.1 takes them for text."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def smoke_version(config: StudyConfig) -> StudyConfig:
+    """Return a config with a short horizon for quick checks: coarse mesh, no refinement."""
+    mesh = config.mesh.model_copy(
+        update={"start_intervals_per_phase": 2, "intervals": 0, "refinements": 0}
+    )
+    solver = config.solver.model_copy(update={"coarse_tolerance": 1e-3, "max_iterations": 400})
+    return config.model_copy(update={"mesh": mesh, "solver": solver, "smoke": True})

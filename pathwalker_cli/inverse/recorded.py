@@ -1,0 +1,80 @@
+"""The `recorded` block of a patient's file: what gait was like over all trials of a condition."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pinocchio as pin
+
+from pathwalker_cli.conventions import Condition, Side
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.cycles import gait_cycles, joint_ranges, step_lengths, walking_speed
+from pathwalker_cli.inverse.forces import foot_extents
+from pathwalker_cli.io.recordings import CompactRecording
+from pathwalker_cli.model.urdf import pinocchio_model
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient_blocks import Recorded
+
+__all__ = ["recorded"]
+
+
+def recorded(
+    patient: Patient, condition: Condition, trials: Sequence[CompactRecording]
+) -> Recorded:
+    """Return the ranges of walking speed, step length and joint angles over trials.
+
+    Speed is the mean over each recording; a step reaches from flat heel to flat heel; angles are
+    those of complete gait cycles, unfiltered.
+
+    Args:
+        patient: The patient.
+        condition: What was worn.
+        trials: The trials.
+
+    Raises:
+        DataError: If the trials show no complete gait cycle or no step of a side.
+    """
+    speeds = [walking_speed(trial.motion) for trial in trials]
+    steps = _steps(pinocchio_model(patient, condition), trials)
+    ranges = joint_ranges(tuple((trial.motion, gait_cycles(trial.events)) for trial in trials))
+    if not ranges or not all(steps.values()):
+        raise DataError(f"{condition} trials of {patient.id} show no complete cycle and step")
+    return Recorded.model_validate(
+        {
+            "walking_speed": {
+                "mean": _rounded(np.mean(speeds)),
+                "min": _rounded(min(speeds)),
+                "max": _rounded(max(speeds)),
+            },
+            "step_length": {
+                side: {"min": _rounded(min(lengths)), "max": _rounded(max(lengths))}
+                for side, lengths in steps.items()
+            },
+            "joint_ranges": {
+                name: (_rounded(low), _rounded(high)) for name, (low, high) in ranges.items()
+            },
+        }
+    )
+
+
+def _steps(model: pin.Model, trials: Sequence[CompactRecording]) -> dict[Side, list[float]]:
+    """Return the step lengths of all trials per side [m]."""
+    steps: dict[Side, list[float]] = {"right": [], "left": []}
+    for trial in trials:
+        heels = {
+            side: ends[:, 0] for side, ends in foot_extents(model, trial.motion.values).items()
+        }
+        for side, lengths in step_lengths(trial.events, heels, _rate(trial)).items():
+            steps[side] += lengths
+    return steps
+
+
+def _rate(trial: CompactRecording) -> float:
+    """Return the frames per second of a trial [1/s]."""
+    return (trial.motion.time.size - 1) / trial.motion.duration
+
+
+def _rounded(value: float | np.floating) -> float:
+    """Return a value to the millimetre or milliradian."""
+    return round(float(value), 3)

@@ -1,0 +1,164 @@
+"""Configs of the studies of recorded gait: which trials, which method, which choices."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, TypeVar
+
+from pydantic import Field, field_validator, model_validator
+
+# The lookup of files, overrides and patients is the same for all configs.
+from pathwalker_cli.config import _apply, _find, _patient_path
+from pathwalker_cli.conventions import CONDITIONS, Condition
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.inverse.filters import MOTION_CUTOFF
+from pathwalker_cli.inverse.gaps import LONGEST_GAP
+from pathwalker_cli.io.fields import Quantity, YamlModel, invalid
+from pathwalker_cli.io.yaml_file import read_mapping, validate
+
+__all__ = [
+    "InverseDynamicsConfig",
+    "InverseKinematicsConfig",
+    "Paths",
+    "RecordedConfig",
+    "load_inverse_dynamics",
+    "load_inverse_kinematics",
+]
+
+Config = TypeVar("Config", bound="RecordedConfig")
+
+
+class Paths(YamlModel):
+    """C3D files, or folders of them, per condition."""
+
+    barefoot: tuple[str, ...] = ()
+    orthosis: tuple[str, ...] = ()
+
+    def of(self, condition: Condition) -> tuple[str, ...]:
+        """Return the paths of one condition."""
+        return self.orthosis if condition == "orthosis" else self.barefoot
+
+
+class RecordedConfig(YamlModel):
+    """What both studies of recorded gait choose."""
+
+    patient: str
+    conditions: tuple[Condition, ...] = CONDITIONS
+    c3d: Paths = Paths()
+    markers: str | None = None
+    longest_gap: Annotated[float, Quantity("s", 0.0, 1.0, above="is it in frames?")] = LONGEST_GAP
+    largest_marker_distance: Annotated[float, Quantity("body heights", 0.001, 1.0)] = 0.025
+
+    @field_validator("conditions")
+    @classmethod
+    def _some(cls, value: tuple[Condition, ...]) -> tuple[Condition, ...]:
+        if not value or len(set(value)) != len(value):
+            raise invalid("is empty or names one twice", allowed=", ".join(CONDITIONS))
+        return value
+
+    @property
+    def recorded_conditions(self) -> tuple[Condition, ...]:
+        """Conditions of which C3D files are named."""
+        return tuple(condition for condition in self.conditions if self.c3d.of(condition))
+
+    def require_c3d(self, where: str) -> None:
+        """Refuse a config that names no C3D file.
+
+        Raises:
+            ConfigError: If it names none.
+        """
+        if not self.recorded_conditions:
+            raise ConfigError(
+                f"names no C3D file of {' or '.join(self.conditions)}",
+                where=f"{where}: c3d",
+                allowed="lists of files or folders per condition",
+                mend=f"add them there or by --set c3d.{self.conditions[0]}=[FOLDER]",
+            )
+
+
+class InverseKinematicsConfig(RecordedConfig):
+    """Joint angles from markers."""
+
+    study: Literal["inverse-kinematics"]
+
+
+class InverseDynamicsConfig(RecordedConfig):
+    """Joint torques, residuals and strengths from motion and ground forces."""
+
+    study: Literal["inverse-dynamics"]
+    source: Literal["recordings", "c3d"] = "recordings"
+    trials: tuple[str, ...] = ()
+    method: Literal["default", "published"] = "default"
+    motion_cutoff: Annotated[float, Quantity("Hz", 1.0, 50.0)] = MOTION_CUTOFF
+    least_frames: Annotated[int, Field(ge=1, le=10000)] = 20
+    least_stances: Annotated[int, Field(ge=1, le=1000)] = 3
+    angle_error: Annotated[float, Quantity("rad", 0.0, 0.5, above="is it in degrees?")] = 0.09
+    speed_error: Annotated[float, Quantity("rad/s", 0.0, 5.0)] = 0.5
+    largest_sensitivity: Annotated[float, Quantity("", 0.0, 10.0)] = 0.15
+    largest_residual: Annotated[float, Quantity("body weights", 0.0, 1.0)] = 0.15
+
+    @model_validator(mode="after")
+    def _raw(self) -> InverseDynamicsConfig:
+        if self.method == "published" and self.source != "c3d":
+            raise invalid(
+                "asks for method published from recordings, which lack the plates' channels",
+                allowed="source c3d with method published",
+                mend="set source to c3d and name the files below c3d",
+            )
+        return self
+
+
+def load_inverse_kinematics(
+    path: str | Path, changes: tuple[str, ...] = ()
+) -> InverseKinematicsConfig:
+    """Read the config of an inverse kinematics study.
+
+    Args:
+        path: The YAML file, or the name of a shipped one.
+        changes: Overrides "dotted.key=value".
+
+    Raises:
+        ConfigError: If file or overrides are wrong, or no C3D file is named.
+    """
+    config = _load(path, changes, InverseKinematicsConfig)
+    config.require_c3d(str(path))
+    return config
+
+
+def load_inverse_dynamics(path: str | Path, changes: tuple[str, ...] = ()) -> InverseDynamicsConfig:
+    """Read the config of an inverse dynamics study.
+
+    Args:
+        path: The YAML file, or the name of a shipped one.
+        changes: Overrides "dotted.key=value".
+
+    Raises:
+        ConfigError: If file or overrides are wrong, or source is c3d and no file is named.
+    """
+    config = _load(path, changes, InverseDynamicsConfig)
+    if config.source == "c3d":
+        config.require_c3d(str(path))
+    return config
+
+
+def _load(path: str | Path, changes: tuple[str, ...], model_class: type[Config]) -> Config:
+    """Read a config; its paths are relative to its own folder where something is there."""
+    source = _find(Path(path))
+    mapping, lines = read_mapping(source, ConfigError)
+    for change in changes:
+        _apply(mapping, change)
+    config = validate(mapping, model_class, where=str(path), error=ConfigError, lines=lines)
+    beside = source.parent
+    paths = {c: tuple(_placed(p, beside) for p in config.c3d.of(c)) for c in config.conditions}
+    changed = {
+        "patient": _patient_path(config.patient, source),
+        "c3d": Paths(**paths),
+        "markers": _placed(config.markers, beside) if config.markers else None,
+    }
+    return config.model_copy(update=changed)
+
+
+def _placed(path: str, beside: Path) -> str:
+    """Return a path beside the config if something is there, else the path as it is."""
+    candidate = beside / path
+    return str(candidate) if candidate.exists() else path

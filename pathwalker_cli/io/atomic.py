@@ -1,0 +1,43 @@
+"""Files that are there in full or not at all: written beside their place, then moved into it."""
+
+from __future__ import annotations
+
+import os
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any, Literal
+
+__all__ = ["atomic_open", "atomic_path"]
+
+
+@contextmanager
+def atomic_path(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path that takes the place of `path` when the block ends without an error.
+
+    After an error the temporary file is gone and an older file at `path` is untouched.
+
+    Args:
+        path: Where the file shall be; its folder must exist.
+    """
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.tmp")
+    try:
+        yield temporary
+        os.replace(temporary, target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_open(path: str | Path, mode: Literal["w", "wb"] = "w") -> Iterator[IO[Any]]:
+    """Yield an open file that appears at `path` when the block ends without an error.
+
+    Args:
+        path: Where the file shall be; its folder must exist.
+        mode: "w" for UTF-8 text with line ends as they are written, "wb" for bytes.
+    """
+    text = {"encoding": "utf-8", "newline": ""} if mode == "w" else {}
+    with atomic_path(path) as temporary, temporary.open(mode, **text) as file:  # type: ignore[call-overload]
+        yield file

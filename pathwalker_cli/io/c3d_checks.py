@@ -1,0 +1,196 @@
+"""What a C3D file must hold before it is worth evaluating; each refusal is one sentence."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.c3d import Recording, read_c3d
+
+__all__ = ["c3d_files", "checked_recording", "require_plates"]
+
+LEAST_FRAMES: Final = 20
+"""Frames that the zero-lag filter needs at the ends, and fewer than any step has."""
+
+SPAN: Final = (0.25, 4.0)
+"""Height of the markers over the floor's lowest one as a share of the body's height: a person is
+inside, whatever the posture; a wrong unit is off by 10 or 1000."""
+
+_BLOCK: Final = 512
+_INTEL: Final = 84
+_ENDLESS: Final = 65535
+"""Last frame in the header of recordings too long for its 16 bits."""
+
+
+def c3d_files(paths: Sequence[str | Path]) -> tuple[Path, ...]:
+    """Return C3D files in order; a folder stands for all that are in it.
+
+    Raises:
+        DataError: If a path does not exist, a folder holds none, or two files have one name.
+    """
+    found: list[Path] = []
+    for path in map(Path, paths):
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() == ".c3d")
+            if not inside:
+                raise DataError("no C3D file in this folder", where=str(path), allowed="*.c3d")
+            found += inside
+        elif path.is_file():
+            found.append(path)
+        else:
+            raise DataError("no such recording", where=str(path), mend="check the path")
+    unique = tuple({path.resolve(): path for path in found}.values())
+    stems = [path.stem for path in unique]
+    twice = next((path for path in unique if stems.count(path.stem) > 1), None)
+    if twice:
+        raise DataError(
+            f"two recordings are called {twice.stem}", where=str(twice), mend="rename one of them"
+        )
+    return unique
+
+
+def checked_recording(path: Path, markers: Sequence[str], height: float) -> Recording:
+    """Read a recording and check that it can be evaluated.
+
+    Args:
+        path: The C3D file.
+        markers: Names of the markers that are needed.
+        height: Height of the patient [m].
+
+    Raises:
+        DataError: If the file is damaged, or lacks frames, markers or events.
+    """
+    try:
+        recording = read_c3d(path)
+    except (ValueError, LookupError, ArithmeticError, TypeError, MemoryError) as problem:
+        raise DataError(
+            f"is damaged: {problem}", where=str(path), mend="export the recording again"
+        ) from None
+    markers = tuple(dict.fromkeys(markers))
+    _check_length(path)
+    _check_frames(recording, path)
+    _check_markers(recording, markers, path)
+    _check_unit(recording, markers, height, path)
+    _check_signals(recording, path)
+    if not any(event.kind == "foot_strike" for event in recording.events):
+        raise DataError(
+            "has no foot strike events",
+            where=str(path),
+            allowed="EVENT labels 'Foot Strike' and 'Foot Off' with contexts 'Left' and 'Right'",
+            mend="mark them in the motion capture software and export again",
+        )
+    return recording
+
+
+def require_plates(recording: Recording, path: Path) -> None:
+    """Refuse a recording without force plates.
+
+    Raises:
+        DataError: If there are none.
+    """
+    if not recording.plates:
+        raise DataError(
+            "has no force plates",
+            where=str(path),
+            allowed="Kistler plates (type 3) with eight channels each",
+            mend="use ik for joint angles alone, or export the analog channels too",
+        )
+
+
+def _check_length(path: Path) -> None:
+    """Refuse a file that is shorter than its header says; readers drop the missing frames."""
+    with path.open("rb") as file:
+        header = file.read(_BLOCK)
+        file.seek((header[0] - 1) * _BLOCK)
+        parameters = file.read(4)
+    if len(parameters) < 4 or parameters[3] != _INTEL:
+        return
+    points, analog, first, last, _ = struct.unpack("<5H", header[2:12])
+    scale, start = struct.unpack("<fH", header[12:18])
+    frame = (4 * points + analog) * (4 if scale < 0.0 else 2)
+    frames = last - first + 1
+    present = (path.stat().st_size - (start - 1) * _BLOCK) // frame if frame else frames
+    if last != _ENDLESS and present < frames:
+        raise DataError(
+            f"is cut off: {max(present, 0)} of its {frames} frames are there",
+            where=str(path),
+            mend="copy or export the recording again",
+        )
+
+
+def _check_frames(recording: Recording, path: Path) -> None:
+    """Refuse a recording that is no motion."""
+    frames = recording.positions.shape[0]
+    if not (np.isfinite(recording.rate) and recording.rate > 0.0):
+        raise DataError(f"has {recording.rate:g} frames per second", where=str(path))
+    if frames < LEAST_FRAMES:
+        raise DataError(
+            f"has {frames} frame{'s' if frames != 1 else ''}",
+            where=str(path),
+            allowed=f"at least {LEAST_FRAMES}",
+            mend="use the recording of a walk, not of a pose",
+        )
+
+
+def _check_markers(recording: Recording, markers: Sequence[str], path: Path) -> None:
+    """Refuse a recording in which a marker is missing or was never seen."""
+    mend = "correct the names in the file or give another marker set"
+    if not recording.markers or recording.positions.size == 0:
+        raise DataError("has no markers", where=str(path), allowed=", ".join(markers))
+    missing = [name for name in markers if name not in recording.markers]
+    if missing:
+        raise DataError(
+            f"has no marker {', '.join(missing)}",
+            where=str(path),
+            allowed=_some(recording.markers),
+            mend=mend,
+        )
+    unseen = [n for n in markers if not np.isfinite(recording.marker(n)).any()]
+    if unseen:
+        raise DataError(
+            f"never shows marker {', '.join(unseen)}",
+            where=str(path),
+            mend="label it in some frames, or take it out of the marker set",
+        )
+
+
+def _check_unit(recording: Recording, markers: Sequence[str], height: float, path: Path) -> None:
+    """Refuse a recording whose lengths cannot be in the unit that it names."""
+    up = np.stack([recording.marker(name)[:, 2] for name in markers], axis=1)
+    frames = np.isfinite(up).any(axis=1)
+    span = float(np.median(np.nanmax(up[frames], axis=1) - np.nanmin(up[frames], axis=1)))
+    if not SPAN[0] * height < span < SPAN[1] * height:
+        mend = "POINT:UNITS must name the unit of the positions: mm and m confused?"
+        if span < 1e-9:
+            mend = "the vertical must be z"
+        raise DataError(
+            f"its markers span {span:.4g} m from the lowest to the highest",
+            where=str(path),
+            allowed=f"{SPAN[0] * height:.2g} to {SPAN[1] * height:.2g} m at a body height of "
+            f"{height:g} m",
+            mend=mend,
+        )
+
+
+def _check_signals(recording: Recording, path: Path) -> None:
+    """Refuse a recording whose force plates hold something else than numbers."""
+    for plate in recording.plates:
+        bad = np.flatnonzero(~np.isfinite(plate.channels).all(axis=1))
+        if bad.size:
+            raise DataError(
+                f"{plate.name} holds NaN or infinity in {bad.size} samples, first in {bad[0]}",
+                where=str(path),
+                allowed="finite forces",
+                mend="export the analog channels again",
+            )
+
+
+def _some(names: Sequence[str], most: int = 40) -> str:
+    """Return names in a row, the first ones if there are many."""
+    shown = ", ".join(names[:most])
+    return f"{shown} and {len(names) - most} more" if len(names) > most else shown

@@ -1,0 +1,122 @@
+"""The compact recordings that stand beside a patient: angles, events and forces as CSV."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from pathwalker_cli.conventions import COORDINATES, Condition, coordinate_unit
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.c3d import Event
+from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.trajectory import Trajectory
+
+__all__ = ["CompactRecording", "read_recording", "recording_names", "write_recording"]
+
+_EVENT_COLUMNS: Final = ["side", "event", "frame", "time [s]"]
+
+
+@dataclass(frozen=True)
+class CompactRecording:
+    """One recorded trial.
+
+    Args:
+        name: Name of the trial.
+        motion: Coordinates in every frame, unfiltered.
+        events: Foot strikes and toe-offs; frames count the rows of `motion`.
+        forces: Columns force_r_x, force_r_z, cop_r_x and the same on the left, NaN where not
+            measured (centre of pressure: or not loaded); None if there is no such file.
+    """
+
+    name: str
+    motion: Trajectory
+    events: tuple[Event, ...]
+    forces: Trajectory | None
+
+
+def write_recording(folder: str | Path, recording: CompactRecording) -> None:
+    """Write `<trial>_angles.csv`, `<trial>_events.csv` and `<trial>_forces.csv` into a folder."""
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = folder / recording.name
+    write_trajectory(f"{stem}_angles.csv", recording.motion)
+    with Path(f"{stem}_events.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_EVENT_COLUMNS)
+        for event in recording.events:
+            time = recording.motion.time[event.frame]
+            writer.writerow([event.side, event.kind, event.frame, f"{time:.6g}"])
+    if recording.forces is not None:
+        write_trajectory(f"{stem}_forces.csv", recording.forces)
+
+
+def recording_names(patient: Patient, condition: Condition) -> tuple[str, ...]:
+    """Return the names of the trials that stand beside a patient's file."""
+    folder = _folder(patient, condition)
+    return tuple(sorted(p.name.removesuffix("_angles.csv") for p in folder.glob("*_angles.csv")))
+
+
+def read_recording(patient: Patient, condition: Condition, name: str) -> CompactRecording:
+    """Read one trial that stands beside a patient's file.
+
+    Raises:
+        DataError: If there is no such trial, or a file of it cannot be used.
+    """
+    names = recording_names(patient, condition)
+    if name not in names:
+        raise DataError(
+            f"patient {patient.id} has no {condition} recording '{name}'",
+            allowed=", ".join(names) or "none are there",
+            mend="import C3D files first",
+        )
+    stem = _folder(patient, condition) / name
+    motion = read_trajectory(f"{stem}_angles.csv")
+    expected = tuple((column, coordinate_unit(column)) for column in COORDINATES)
+    if tuple(zip(motion.names, motion.units, strict=True)) != expected:
+        allowed = ", ".join(f"{column} [{unit}]" for column, unit in expected)
+        raise DataError("has other columns", where=f"{stem}_angles.csv", allowed=allowed)
+    forces = Path(f"{stem}_forces.csv")
+    return CompactRecording(
+        name=name,
+        motion=motion,
+        events=_read_events(Path(f"{stem}_events.csv"), motion.time.size),
+        forces=read_trajectory(forces, missing=True) if forces.is_file() else None,
+    )
+
+
+def _folder(patient: Patient, condition: Condition) -> Path:
+    """Return the folder of a condition's recordings."""
+    if patient.folder is None:
+        raise DataError(f"patient {patient.id} was not read from a file")
+    return patient.folder / "recordings" / condition
+
+
+def _read_events(path: Path, frames: int) -> tuple[Event, ...]:
+    """Return the events in a file."""
+    if not path.is_file():
+        raise DataError("no such file", where=str(path), mend="import the recording again")
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    if not rows or rows[0] != _EVENT_COLUMNS:
+        raise DataError(
+            "has another header", where=f"{path}, row 1", allowed=",".join(_EVENT_COLUMNS)
+        )
+    return tuple(_event(row, f"{path}, row {n}", frames) for n, row in enumerate(rows[1:], start=2))
+
+
+def _event(row: list[str], place: str, frames: int) -> Event:
+    """Return the event in a row."""
+    side, kind, frame = (*row, "", "", "")[:3]
+    if side not in ("right", "left") or kind not in ("foot_strike", "toe_off"):
+        raise DataError(
+            f"'{side},{kind}' is no event",
+            where=place,
+            allowed="right or left, foot_strike or toe_off",
+        )
+    if not frame.isdigit() or int(frame) >= frames:
+        raise DataError(f"frame is '{frame}'", where=place, allowed=f"0 to {frames - 1}")
+    return Event("right" if side == "right" else "left",
+                 "toe_off" if kind == "toe_off" else "foot_strike", int(frame))  # fmt: skip

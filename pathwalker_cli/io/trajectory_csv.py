@@ -1,0 +1,121 @@
+"""Trajectories as CSV: one column per name, its unit in the header, six significant digits."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.trajectory import Trajectory
+
+__all__ = ["read_trajectory", "write_trajectory"]
+
+_HEADER: Final = re.compile(r"^\s*(?P<name>\w+)\s*\[(?P<unit>[^\]]*)\]\s*$")
+
+
+def write_trajectory(path: str | Path, trajectory: Trajectory, digits: int = 6) -> None:
+    """Write a trajectory; values that are NaN become empty cells.
+
+    Args:
+        path: The file.
+        trajectory: What to write.
+        digits: Significant digits.
+    """
+    names = zip(trajectory.names, trajectory.units, strict=True)
+    with Path(path).open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["time [s]", *(f"{name} [{unit}]" for name, unit in names)])
+        for time, row in zip(trajectory.time, trajectory.values, strict=True):
+            writer.writerow([_text(value, digits) for value in (time, *row)])
+
+
+def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
+    """Read a trajectory.
+
+    Args:
+        path: The file.
+        missing: Whether empty cells are allowed; they become NaN.
+
+    Raises:
+        DataError: If the file cannot be read; the message names row and column.
+    """
+    rows = _rows(Path(path))
+    names, units = _header(rows[0], path)
+    values = np.empty((len(rows) - 1, len(names)))
+    for index, row in enumerate(rows[1:]):
+        number = index + 2
+        if len(row) != len(names):
+            raise DataError(
+                f"has {len(row)} cells", where=f"{path}, row {number}", allowed=f"{len(names)}"
+            )
+        for column, cell in enumerate(row):
+            place = f"{path}, row {number}, column {names[column]}"
+            values[index, column] = _number(cell, place, missing and column > 0)
+    time = values[:, 0]
+    if time.size == 0:
+        raise DataError("has no rows below its header", where=str(path))
+    late = np.flatnonzero(np.diff(time) <= 0.0)
+    if late.size:
+        raise DataError("time does not increase", where=f"{path}, row {late[0] + 3}, column time")
+    return Trajectory(time, tuple(names[1:]), values[:, 1:], tuple(units[1:]))
+
+
+def _rows(path: Path) -> list[list[str]]:
+    """Return the rows of a CSV file without empty ones."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except FileNotFoundError:
+        raise DataError("no such file", where=str(path), mend="check the path") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as problem:
+        raise DataError(f"cannot be read: {problem}", where=str(path)) from None
+    if not rows:
+        raise DataError("is empty", where=str(path))
+    return rows
+
+
+def _header(row: list[str], path: str | Path) -> tuple[list[str], list[str]]:
+    """Return names and units of the columns; the first must be time [s]."""
+    names, units = [], []
+    for column, cell in enumerate(row, start=1):
+        match = _HEADER.match(cell)
+        if not match:
+            raise DataError(
+                f"'{cell}' is no column header",
+                where=f"{path}, row 1, column {column}",
+                allowed="name [unit], e.g. hip_r [rad]",
+            )
+        names.append(match["name"])
+        units.append(match["unit"].strip())
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice:
+        raise DataError(f"has column {twice} twice", where=f"{path}, row 1")
+    if (names[0], units[0]) != ("time", "s"):
+        raise DataError(
+            f"starts with '{row[0]}'", where=f"{path}, row 1, column 1", allowed="time [s]"
+        )
+    return names, units
+
+
+def _number(cell: str, place: str, missing: bool) -> float:
+    """Return the number in a cell."""
+    if missing and not cell.strip():
+        return math.nan
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        shown = f"'{cell.strip()}'" if cell.strip() else "empty"
+        raise DataError(f"is {shown}", where=place, allowed="a finite number")
+    return value
+
+
+def _text(value: float, digits: int) -> str:
+    """Return a number as text."""
+    return "" if math.isnan(value) else f"{value:.{digits}g}"

@@ -1,0 +1,381 @@
+"""Gait as a multi-phase optimal control problem, equations (3) to (7), (9) and (10).
+
+States are q and v; algebraic variables are accelerations, the contact forces of the phase and
+reserve forces (zero but in the first stage of a solve); smooth states are the activations and the
+controls their rates.  For fixed a, equation (2) increases strictly in the excitation e, so
+0 <= e <= 1 is the same as -a / tau_D <= da/dt <= (1 - a) / tau_A: no kink and no excitation needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+import casadi as ca
+import numpy as np
+
+from pathwalker_cli.conventions import (
+    CONTACT_FORCES,
+    CONTACT_POINTS,
+    COORDINATES,
+    GENERATORS,
+    SIDES,
+)
+from pathwalker_cli.model.contact import PHASES, ContactPhase
+from pathwalker_cli.model.curves import BezierChain, evaluate
+from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME
+from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
+from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
+from pathwalker_cli.ocp.frozen import FrozenTerms
+from pathwalker_cli.ocp.problem import INFINITY, Boundary, MultiPhaseProblem, Phase, Rows, Variables
+
+__all__ = ["INTEGRALS", "STIFFNESSES", "WEIGHTS", "GaitProblem", "GaitWeights"]
+
+VELOCITIES: Final = tuple(f"{name}_velocity" for name in COORDINATES)
+ACCELERATIONS: Final = tuple(f"{name}_acceleration" for name in COORDINATES)
+RESERVES: Final = tuple(f"{name}_reserve" for name in COORDINATES)
+ACTIVATIONS: Final = tuple(f"{name}_activation" for name in GENERATORS)
+RATES: Final = tuple(f"{name}_rate" for name in GENERATORS)
+STIFFNESSES: Final = tuple(
+    f"{kind}_stiffness_{side}" for kind in ("dorsiflexion", "plantarflexion") for side in SIDES
+)
+"""Free orthosis parameters in order: K_D right, left, K_P right, left [N m/rad]."""
+INTEGRALS: Final = ("effort", "rate", "acceleration", "tracking", "reserve")
+"""Running costs: the sums of a^2, (rate / 20)^2, (vdot / 50)^2, (q - q_ref)^2 and
+(reserve / 20)^2."""
+
+# What counts as 1 for the solver; with these the prototypes needed the fewest iterations.
+_VELOCITY, _ACCELERATION, _FORCE, _TORQUE = 5.0, 50.0, 100.0, 20.0
+_RATE, _STIFFNESS, _HEIGHT = 20.0, 50.0, 0.1
+
+
+@dataclass(frozen=True)
+class GaitWeights:
+    """Weights of the cost terms.
+
+    Args:
+        effort: Weight of the effort per distance, equation (9).
+        rate: Weight of the squared activation rates per distance (regularisation).
+        acceleration: Weight of the squared accelerations per distance (regularisation).
+        walking_speed: lambda of equation (10).
+        tracking: Weight of the integral of (q - q_ref)^2.
+        reserve: Weight of the integral of the squared reserve forces.
+        smoothing: Weight of the integrals of squared activations and rates, not per distance.
+    """
+
+    effort: float = 1.0
+    rate: float = 1e-3
+    acceleration: float = 0.0
+    walking_speed: float = 0.0
+    tracking: float = 0.0
+    reserve: float = 0.0
+    smoothing: float = 0.0
+
+    def vector(self) -> np.ndarray:
+        """Return the weights in the order of `WEIGHTS`."""
+        return np.array([getattr(self, name) for name in WEIGHTS])
+
+
+WEIGHTS: Final = (
+    "effort",
+    "rate",
+    "acceleration",
+    "walking_speed",
+    "tracking",
+    "reserve",
+    "smoothing",
+)
+
+
+class _Constants:
+    """Symbols of the numbers that a patient and a config bring in, and their values."""
+
+    def __init__(self, walker: Walker) -> None:
+        body = walker.rigid_body
+        self.theta = ca.SX.sym("theta", len(body.parameter_names))
+        self.strength = ca.SX.sym("strength", len(GENERATORS))
+        self.friction = ca.SX.sym("friction")
+        self.weights = ca.SX.sym("weights", len(WEIGHTS))
+        self._sides = [] if walker.orthosis is None else [ca.SX.sym(s, 7) for s in SIDES]
+
+    @property
+    def vector(self) -> ca.SX:
+        """All constants, one after the other."""
+        return ca.vertcat(self.theta, self.strength, self.friction, self.weights, *self._sides)
+
+    @property
+    def sides(self) -> tuple[OrthosisSide, ...]:
+        """Symbolic orthosis parameters right and left, or none."""
+        return tuple(OrthosisSide(*ca.vertsplit(side)) for side in self._sides)
+
+    @staticmethod
+    def values(
+        walker: Walker, weights: GaitWeights, friction: float, orthosis_share: float
+    ) -> np.ndarray:
+        """Return the values in the order of `vector`."""
+        sides = [side.scaled(orthosis_share) for side in walker.orthosis or ()]
+        return np.concatenate(
+            [
+                walker.rigid_body.parameters,
+                walker.max_isometric_torque,
+                [friction],
+                weights.vector(),
+                *(list(vars(side).values()) for side in sides),
+            ]
+        )
+
+
+def _curve_expansion(chain: BezierChain, sign: float, x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return value, slope and curvature of a curve of sign * x."""
+    point = evaluate(chain, sign * x)
+    return point.value, sign * point.slope, point.curvature
+
+
+def _orthosis_expansion(
+    side: OrthosisSide, angle: ca.SX, k_d: ca.SX, k_p: ca.SX
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return orthosis torque, its gradient and its Hessian in angle, K_D and K_P."""
+    torque = orthosis_torque(side, angle, k_d, k_p)
+    hessian, gradient = ca.hessian(torque, ca.vertcat(angle, k_d, k_p))
+    return torque, gradient, hessian
+
+
+class GaitProblem:
+    """Builds the `MultiPhaseProblem` of a walker.
+
+    Args:
+        walker: The walker; its condition decides whether there are stiffnesses to find.
+    """
+
+    def __init__(self, walker: Walker) -> None:
+        self.walker = walker
+        self.constants = _Constants(walker)
+        scale = np.concatenate([np.ones(len(COORDINATES)), np.full(len(COORDINATES), _VELOCITY)])
+        self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
+        self.activations = Variables.make("a", ACTIVATIONS, 1.0)
+        self.rates = Variables.make("rate", RATES, _RATE)
+        names = STIFFNESSES if walker.orthosis else ()
+        self.stiffness = Variables.make("stiffness", names, _STIFFNESS)
+        self.reference = ca.SX.sym("q_ref", len(COORDINATES))
+
+    @property
+    def q(self) -> ca.SX:
+        """Generalised coordinates."""
+        return self.states.symbol[: len(COORDINATES)]
+
+    @property
+    def v(self) -> ca.SX:
+        """Generalised velocities."""
+        return self.states.symbol[len(COORDINATES) :]
+
+    def build(self) -> MultiPhaseProblem:
+        """Return the problem's structure."""
+        following = PHASES[1:] + PHASES[:1]
+        return MultiPhaseProblem(
+            states=self.states,
+            smooth=self.activations,
+            controls=self.rates,
+            parameters=self.stiffness,
+            shared=self.constants.vector,
+            point_data=self.reference,
+            integrals=INTEGRALS,
+            integral_scale=np.ones(len(INTEGRALS)),
+            phases=tuple(self._phase(*pair) for pair in zip(PHASES, following, strict=True)),
+            node_rows=self._excitation_rows(),
+            boundary=self._boundary(),
+        )
+
+    def shared_values(
+        self, weights: GaitWeights, friction: float, orthosis_share: float = 1.0
+    ) -> np.ndarray:
+        """Return the numbers that go with `MultiPhaseProblem.shared`.
+
+        Args:
+            weights: Weights of the cost terms.
+            friction: Coefficient of friction.
+            orthosis_share: Share of the orthosis' fixed torques, below 1 to ease in a start.
+        """
+        return self.constants.values(self.walker, weights, friction, orthosis_share)
+
+    def torques(self, frozen: FrozenTerms) -> tuple[ca.SX, ca.SX]:
+        """Return muscle torques (14,) and orthosis torques (2,) with frozen curves [N m]."""
+        muscle = []
+        for i, (g, row) in enumerate(zip(self.walker.generators, GENERATOR_ROWS, strict=True)):
+            angle = partial(_curve_expansion, g.curves.active_torque_angle, g.angle_sign)
+            speed = partial(_curve_expansion, g.curves.torque_angular_velocity, g.torque_sign)
+            factor = frozen.taylor(angle, self.q[row]) * frozen.taylor(speed, self.v[row])
+            peak = g.torque_sign * self.constants.strength[i]
+            muscle.append(peak * self.activations.symbol[i] * factor)
+        orthosis = [
+            frozen.taylor(
+                partial(_orthosis_expansion, side),
+                self.q[row],
+                self.stiffness.symbol[i],
+                self.stiffness.symbol[i + 2],
+            )
+            for i, (side, row) in enumerate(zip(self.constants.sides, ANKLES, strict=False))
+        ]
+        return ca.vertcat(*muscle), ca.vertcat(*orthosis) if orthosis else ca.SX.zeros(2)
+
+    def _phase(self, contact: ContactPhase, following: ContactPhase) -> Phase:
+        body, theta, frozen = self.walker.rigid_body, self.constants.theta, FrozenTerms()
+        names = ACCELERATIONS + contact.forces + RESERVES
+        counts = [len(ACCELERATIONS), len(contact.forces), len(RESERVES)]
+        scale = np.repeat([_ACCELERATION, _FORCE, _TORQUE], counts)
+        z = Variables.make("z", names, scale)
+        vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
+        muscle, orthosis = self.torques(frozen)
+        tau = ca.SX(len(COORDINATES), 1)
+        for row, torque in zip(GENERATOR_ROWS, ca.vertsplit(muscle), strict=True):
+            tau[row] += torque
+        for row, torque in zip(ANKLES, ca.vertsplit(orthosis), strict=True):
+            tau[row] += torque
+        active = list(contact.indices)
+        jacobian = body.point_jacobian(self.q, theta)[active, :]
+        balance = body.inverse_dynamics(self.q, self.v, vdot, theta) - tau - reserve
+        balance -= jacobian.T @ force
+        motion = self._point_motion(vdot)
+        residual = Rows.join(
+            Rows.make(balance, tuple(f"{n} equation of motion" for n in COORDINATES), _TORQUE),
+            Rows.make(
+                motion["acceleration"][active],
+                tuple(f"{n} contact acceleration" for n in contact.forces),
+                _TORQUE,
+            ),
+        )
+        return Phase(
+            name=contact.name,
+            algebraic=z,
+            derivative=ca.vertcat(self.v, vdot),
+            residual=residual,
+            path=self._path(contact, force, motion["position"]),
+            end=self._touch_down(contact.touched_down(following), motion),
+            fixed_at_end=self._fixed_at_end(contact, following),
+            integrands=self._integrands(vdot, reserve),
+            frozen=frozen,
+        )
+
+    def _point_motion(self, vdot: ca.SX) -> dict[str, ca.SX]:
+        """Return positions, velocities and accelerations of the contact points, (8,) each."""
+        body, theta = self.walker.rigid_body, self.constants.theta
+        return {
+            "position": body.point_positions(self.q, theta),
+            "velocity": body.point_velocities(self.q, self.v, theta),
+            "acceleration": body.point_accelerations(self.q, self.v, vdot, theta),
+        }
+
+    def _integrands(self, vdot: ca.SX, reserve: ca.SX) -> ca.SX:
+        return ca.vertcat(
+            ca.sumsqr(self.activations.symbol),
+            ca.sumsqr(self.rates.symbol / _RATE),
+            ca.sumsqr(vdot / _ACCELERATION),
+            ca.sumsqr(self.q - self.reference),
+            ca.sumsqr(reserve / _TORQUE),
+        )
+
+    def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
+        """Return heights of the points in the air and the friction cones of the loaded feet."""
+        airborne = [p for p in CONTACT_POINTS if p not in contact.points]
+        heights = [position[CONTACT_FORCES.index(f"{p}_z")] for p in airborne]
+        rows = [
+            Rows.make(
+                ca.vertcat(*heights), tuple(f"{p} height" for p in airborne), _HEIGHT, 0.0, INFINITY
+            )
+        ]
+        for side in sorted({point[-1] for point in contact.points}):
+            parts = [(n, force[i]) for i, n in enumerate(contact.forces) if n[-3] == side]
+            normal = sum(f for n, f in parts if n.endswith("z"))
+            tangent = sum(f for n, f in parts if n.endswith("x"))
+            cone = self.constants.friction * normal
+            names = (f"foot_{side} forward friction", f"foot_{side} backward friction")
+            value = ca.vertcat(cone - tangent, cone + tangent)
+            rows.append(Rows.make(value, names, _FORCE, 0.0, INFINITY))
+        return Rows.join(*rows)
+
+    def _touch_down(self, directions: tuple[str, ...], motion: Mapping[str, ca.SX]) -> Rows:
+        """Return the rows that let new points meet the ground without impact and without force.
+
+        Zero acceleration of a new point just before contact is the same as zero force just after.
+        """
+        index = [CONTACT_FORCES.index(n) for n in directions]
+        vertical = [n for n in directions if n.endswith("z")]
+        lifts = [CONTACT_FORCES.index(n) for n in vertical]
+        return Rows.join(
+            Rows.make(
+                motion["position"][lifts], tuple(f"{n[:-2]} touch-down" for n in vertical), _HEIGHT
+            ),
+            Rows.make(
+                motion["velocity"][index], tuple(f"{n} touch-down velocity" for n in directions), 1.0
+            ),
+            Rows.make(
+                motion["acceleration"][index],
+                tuple(f"{n} touch-down force" for n in directions),
+                _TORQUE,
+            ),
+        )
+
+    @staticmethod
+    def _fixed_at_end(contact: ContactPhase, following: ContactPhase) -> tuple[str, ...]:
+        """Return the path rows that touch-down or lift-off already fix at the end of a phase."""
+        landing = {n[:-2] for n in contact.touched_down(following)}
+        leaving = {p[-1] for p in contact.points} - {p[-1] for p in following.points}
+        return (
+            *(f"{p} height" for p in landing),
+            *(f"foot_{s} {d} friction" for s in leaving for d in ("forward", "backward")),
+        )
+
+    def _excitation_rows(self) -> Rows:
+        """Return 0 <= e <= 1 as two linear rows in activation and rate."""
+        a, rate = self.activations.symbol, self.rates.symbol
+        return Rows.join(
+            Rows.make(
+                DEACTIVATION_TIME * rate + a,
+                tuple(f"{n} excitation above 0" for n in GENERATORS),
+                1.0,
+                0.0,
+                INFINITY,
+            ),
+            Rows.make(
+                ACTIVATION_TIME * rate + a,
+                tuple(f"{n} excitation below 1" for n in GENERATORS),
+                1.0,
+                -INFINITY,
+                1.0,
+            ),
+        )
+
+    def _boundary(self) -> Boundary:
+        groups = (self.states, self.activations, self.rates)
+        first = tuple(ca.SX.sym(f"first{i}", group.size) for i, group in enumerate(groups))
+        last = tuple(ca.SX.sym(f"last{i}", group.size) for i, group in enumerate(groups))
+        durations = ca.SX.sym("durations", len(PHASES))
+        integrals = ca.SX.sym("integrals", len(INTEGRALS))
+        distance, total = last[0][0] - first[0][0], ca.sum1(durations)
+        periodic = [
+            Rows.make(
+                (b - a)[skip:],
+                tuple(f"{name} periodicity" for name in group.names[skip:]),
+                group.scale[skip:],
+            )
+            for a, b, group, skip in zip(first, last, groups, (1, 0, 0), strict=True)
+        ]
+        free = Rows.make(
+            ca.vertcat(distance, distance / total),
+            ("distance", "walking_speed"),
+            1.0,
+            -INFINITY,
+            INFINITY,
+        )
+        weight = dict(zip(WEIGHTS, ca.vertsplit(self.constants.weights), strict=True))
+        total_of = dict(zip(INTEGRALS, ca.vertsplit(integrals), strict=True))
+        per_distance = sum(weight[k] * total_of[k] for k in ("effort", "rate", "acceleration"))
+        objective = per_distance / distance
+        objective += weight["tracking"] * total_of["tracking"]
+        objective += weight["reserve"] * total_of["reserve"]
+        objective += weight["smoothing"] * (total_of["effort"] + total_of["rate"])
+        objective -= weight["walking_speed"] * distance / total
+        return Boundary(
+            first, last, durations, integrals, Rows.join(*periodic, free), objective
+        )

@@ -1,0 +1,57 @@
+"""Mesh intervals: as many as the duration of a phase asks for, more where they are inaccurate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathwalker_cli.ocp.verify import Reintegration
+
+__all__ = ["by_duration", "refined", "uniform"]
+
+
+def uniform(counts: np.ndarray | list[int]) -> tuple[np.ndarray, ...]:
+    """Return equally spaced nodes in [0, 1], one array per phase."""
+    return tuple(np.linspace(0.0, 1.0, int(count) + 1) for count in counts)
+
+
+def by_duration(
+    durations: np.ndarray, intervals: int, least_per_phase: int
+) -> tuple[np.ndarray, ...]:
+    """Return a mesh of about equally long intervals.
+
+    Args:
+        durations: Phase durations [s].
+        intervals: Number of intervals over all phases; short phases may bring in a few more.
+        least_per_phase: Fewest intervals in a phase.
+    """
+    shares = intervals * np.asarray(durations) / np.sum(durations)
+    return uniform(np.maximum(np.ceil(shares), least_per_phase).astype(int).tolist())
+
+
+def refined(
+    meshes: tuple[np.ndarray, ...],
+    errors: Reintegration,
+    position_tolerance: float,
+    velocity_tolerance: float,
+    order: int,
+) -> tuple[np.ndarray, ...]:
+    """Return a mesh in which intervals that miss the tolerances are split.
+
+    Args:
+        meshes: The mesh that was used.
+        errors: Errors on it.
+        position_tolerance: Error of q to stay below [rad, m].
+        velocity_tolerance: Error of v to stay below [rad/s, m/s].
+        order: Order of the error in the length of an interval.
+    """
+    result = []
+    for mesh, position, velocity in zip(meshes, errors.position, errors.velocity, strict=True):
+        ratio = np.maximum(position / position_tolerance, velocity / velocity_tolerance)
+        # half the tolerance is aimed at: splitting changes the neighbours a little, too
+        parts = np.ceil(np.clip(2.0 * ratio, 1e-9, 1e6) ** (1.0 / order))
+        parts = np.where(ratio > 1.0, np.clip(parts, 2, 4), 1).astype(int)
+        pieces = [
+            np.linspace(mesh[i], mesh[i + 1], n + 1)[:-1] for i, n in enumerate(parts.tolist())
+        ]
+        result.append(np.concatenate([*pieces, [1.0]]))
+    return tuple(result)

@@ -1,0 +1,207 @@
+"""Prove a solution: violations by name, active bounds, re-integration, and a second engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.integrate import solve_ivp
+
+from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES
+from pathwalker_cli.model.walker import Walker
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.ipopt import NlpResult
+from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
+from pathwalker_cli.ocp.series import GaitSeries, actuator_torques
+
+__all__ = [
+    "ActiveBound",
+    "Reintegration",
+    "Violation",
+    "active_bounds",
+    "largest_violations",
+    "reintegrate",
+    "second_engine_residual",
+]
+
+_NEAR = 1e-5
+"""Distance in solver units at which a bound counts as active."""
+_PULL = 1e-5
+"""Least multiplier of an active bound: without it the bound does not matter."""
+
+
+@dataclass(frozen=True)
+class Violation:
+    """One constraint or bound that is not met.
+
+    Args:
+        name: What and where.
+        amount: By how much, in its own unit.
+    """
+
+    name: str
+    amount: float
+
+
+def largest_violations(
+    program: CollocationProgram, result: NlpResult, count: int = 5
+) -> tuple[Violation, ...]:
+    """Return the largest violations in physical units, largest first; zero ones count too."""
+    nlp, layout = program.program, program.layout
+    lower, upper = program.bounds
+    rows = np.maximum(nlp.lower - result.rows, result.rows - nlp.upper) * nlp.row_scale
+    unknowns = np.maximum(lower - result.unknowns, result.unknowns - upper) * layout.scale
+    both = np.nan_to_num(np.concatenate([rows, unknowns]), nan=np.inf, neginf=0.0).clip(0.0)
+    found = []
+    for i in np.argsort(-both, kind="stable")[:count]:
+        name = nlp.row_name(int(i)) if i < nlp.rows else f"bound of {layout.names[i - nlp.rows]}"
+        found.append(Violation(name, float(both[i])))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class ActiveBound:
+    """A bound that holds the solution back.
+
+    Args:
+        name: Quantity, e.g. "knee_r" or "walking_speed".
+        side: "lower" or "upper".
+        value: The bound, in the unit of the quantity.
+        places: Phases in which it is active; empty for the whole motion.
+    """
+
+    name: str
+    side: str
+    value: float
+    places: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Return e.g. "knee_r lower 0.42 in left_flat, left_toe"."""
+        where = f" in {', '.join(self.places)}" if self.places else ""
+        return f"{self.name} {self.side} {self.value:.4g}{where}"
+
+
+def active_bounds(program: CollocationProgram, result: NlpResult) -> tuple[ActiveBound, ...]:
+    """Return the inequality bounds that are active with a multiplier, grouped by name."""
+    groups: dict[tuple[str, str, float], list[str]] = {}
+    for name, where, side, value in _active_entries(program, result):
+        phases = groups.setdefault((name, side, round(value, 9)), [])
+        phase = "" if where in ("all phases", "the whole motion") else where.split(" ")[0]
+        if phase and phase not in phases:
+            phases.append(phase)
+    return tuple(ActiveBound(*key, tuple(places)) for key, places in sorted(groups.items()))
+
+
+def _active_entries(
+    program: CollocationProgram, result: NlpResult
+) -> Iterator[tuple[str, str, str, float]]:
+    """Yield name, place, side and value of every active bound."""
+    nlp, layout = program.program, program.layout
+    lower, upper = program.bounds
+    for side, limit, gap, pull in (
+        ("lower", lower, result.unknowns - lower, -result.multipliers.unknowns),
+        ("upper", upper, upper - result.unknowns, result.multipliers.unknowns),
+    ):
+        hit = (gap < _NEAR) & (pull > _PULL) & (upper > lower)
+        for i in np.flatnonzero(hit):
+            name, where = layout.names[i].split(" in ", 1)
+            yield name, where, side, float(limit[i] * layout.scale[i])
+    for side, limit, gap, pull in (
+        ("lower", nlp.lower, result.rows - nlp.lower, -result.multipliers.rows),
+        ("upper", nlp.upper, nlp.upper - result.rows, result.multipliers.rows),
+    ):
+        hit = (gap < _NEAR) & (pull > _PULL) & (nlp.upper > nlp.lower)
+        for i in np.flatnonzero(hit):
+            name, where = nlp.row_place(int(i))
+            yield name, where, side, float(limit[i] * nlp.row_scale[i])
+
+
+@dataclass(frozen=True)
+class Reintegration:
+    """How well an independent integrator meets the next node from each node.
+
+    Args:
+        position: Largest error of q at the end of every interval [rad, m], per phase.
+        velocity: Largest error of v at the end of every interval [rad/s, m/s], per phase.
+    """
+
+    position: tuple[np.ndarray, ...]
+    velocity: tuple[np.ndarray, ...]
+
+    @property
+    def worst_position(self) -> float:
+        """Largest error of q over all intervals [rad, m]."""
+        return float(max(errors.max() for errors in self.position))
+
+    @property
+    def worst_velocity(self) -> float:
+        """Largest error of v over all intervals [rad/s, m/s]."""
+        return float(max(errors.max() for errors in self.velocity))
+
+
+def reintegrate(walker: Walker, motion: PhasedMotion) -> Reintegration:
+    """Integrate every mesh interval anew with DOP853 (relative tolerance 1e-9).
+
+    Accelerations come from the contact-constrained dynamics of the walker, not from the
+    unknowns of the program; activations follow from their rates.
+    """
+    torques = actuator_torques(walker)
+    n = len(COORDINATES)
+    positions, velocities = [], []
+    for phase in motion.phases:
+        errors = np.array([_interval_error(walker, motion, phase, i, torques) for i in
+                           range(phase.intervals)])  # fmt: skip
+        positions.append(errors[:, :n].max(axis=1))
+        velocities.append(errors[:, n:].max(axis=1))
+    return Reintegration(tuple(positions), tuple(velocities))
+
+
+def _interval_error(walker, motion, phase: PhaseMotion, i: int, torques) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """Return the absolute errors of q and v at the end of one interval, shape (20,)."""
+    n = len(COORDINATES)
+    start, step = phase.mesh[i], float(np.diff(phase.mesh)[i])
+
+    def rate(share: float, state: np.ndarray) -> np.ndarray:
+        activation = phase.smooth_at(np.array([start + step * share]))[0]
+        q, v = state[:n], state[n:]
+        muscle, orthosis = (np.asarray(k) for k in torques(q, v, activation, motion.parameters))
+        tau = walker.joint_torques(muscle, orthosis)
+        vdot, _ = walker.contact_dynamics(phase.name, q, v, tau)
+        return phase.duration * step * np.concatenate([v, vdot])
+
+    inside = 1 - 1e-12  # the end itself belongs to the next interval
+    solution = solve_ivp(
+        rate, (0.0, inside), phase.states[i], method="DOP853", rtol=1e-9, atol=1e-10
+    )
+    if not solution.success:
+        return np.full(2 * n, np.inf)
+    return np.asarray(np.abs(solution.y[:, -1] - phase.states[i + 1]))
+
+
+def second_engine_residual(series: GaitSeries) -> float:
+    """Return the largest violation of the equations of motion in numeric Pinocchio [N, N m].
+
+    Independent of the symbolic functions: `pin.rnea`, frame Jacobians, and the NumPy muscle and
+    orthosis curves.
+    """
+    walker = series.walker
+    model, data = walker.model, walker.model.createData()
+    worst = 0.0
+    for k in range(len(series.time)):
+        q = np.array(series.q[k])
+        muscle = walker.muscle_torques(q, series.v[k], series.activation[k])
+        stiffness = series.stiffness if series.stiffness.size else np.ones(4)
+        orthosis = walker.orthosis_torques(q, stiffness[:2], stiffness[2:])
+        needed = pin.rnea(model, data, q, np.array(series.v[k]), np.array(series.vdot[k]))
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        for i, point in enumerate(CONTACT_POINTS):
+            jacobian = pin.getFrameJacobian(
+                model, data, model.getFrameId(point), pin.LOCAL_WORLD_ALIGNED
+            )
+            needed = needed - jacobian[[0, 2]].T @ series.force[k, 2 * i : 2 * i + 2]
+        residual = needed - walker.joint_torques(muscle, orthosis) - series.reserve[k]
+        worst = max(worst, float(np.abs(residual).max()))
+    return worst

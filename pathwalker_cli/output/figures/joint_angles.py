@@ -1,0 +1,76 @@
+"""Figure of the joint angles over the gait cycle."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from matplotlib.figure import Figure
+
+from pathwalker_cli.conventions import SUFFIX, to_degrees
+from pathwalker_cli.ocp.series import GaitSeries
+from pathwalker_cli.output.cycle import BOTH_SIDES
+from pathwalker_cli.output.figures.curves import (
+    CLINICAL_ANGLE,
+    Reference,
+    draw_band,
+    draw_sides,
+)
+from pathwalker_cli.output.figures.style import (
+    NEUTRAL,
+    PAGE,
+    SMALL,
+    band_handle,
+    dress,
+    events_handle,
+    new_figure,
+    percent_axis,
+    side_handles,
+    zero_line,
+)
+
+__all__ = ["joint_angles"]
+
+_PANELS: Final = {
+    "pelvis_tilt": ("Pelvis", "forward tilt [deg]"),
+    "hip": ("Hip", "flexion [deg]"),
+    "knee": ("Knee", "flexion [deg]"),
+    "ankle": ("Ankle", "dorsiflexion [deg]"),
+    "lumbar": ("Trunk against pelvis", "forward lean [deg]"),
+}
+
+
+def joint_angles(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return pelvis, hip, knee, ankle and lumbar angles over the gait cycle of each side.
+
+    Flexion, dorsiflexion and forward lean are positive, as gait laboratories plot them.
+
+    Args:
+        series: The stride.
+        reference: Recorded bands to draw behind.
+    """
+    bands = reference.angles if reference else {}
+    fig = new_figure(PAGE, 4.0)
+    panels = fig.subplots(2, 3).ravel()
+    for ax, (joint, (title, label)) in zip(panels, _PANELS.items(), strict=False):
+        sign, values = CLINICAL_ANGLE.get(joint, 1.0), {}
+        for side in BOTH_SIDES:
+            name = f"{joint}_{SUFFIX[side]}"
+            draw_band(ax, bands.get(name), side, sign * float(to_degrees(1.0)))
+            column = name if joint in CLINICAL_ANGLE else joint
+            values[side] = sign * to_degrees(series.column(column))
+        dress(ax, title, y=label)
+        zero_line(ax)
+        draw_sides(ax, series, values)
+        percent_axis(ax)
+    handles = [*side_handles(), events_handle(), *([band_handle()] if bands else [])]
+    panels[-1].axis("off")
+    panels[-1].legend(handles=handles, loc="upper left", frameon=False, handlelength=2.6)
+    panels[-1].text(
+        0.04,
+        0.05,
+        "Each side from its own\nfoot strike to its next one.",
+        transform=panels[-1].transAxes,
+        fontsize=SMALL,
+        color=NEUTRAL,
+    )
+    return fig

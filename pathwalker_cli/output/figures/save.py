@@ -1,0 +1,93 @@
+"""All figures of a stride, as files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from pathwalker_cli.io.atomic import atomic_path
+from pathwalker_cli.ocp.series import GaitSeries
+from pathwalker_cli.output.figures.activations import activations
+from pathwalker_cli.output.figures.ankle import ankle_torque, orthosis_curves
+from pathwalker_cli.output.figures.curves import Reference
+from pathwalker_cli.output.figures.ground_forces import ground_forces
+from pathwalker_cli.output.figures.joint_angles import joint_angles
+from pathwalker_cli.output.figures.joint_moments import joint_moments
+from pathwalker_cli.output.figures.stick_figures import stick_figures
+from pathwalker_cli.output.figures.style import STYLE
+
+__all__ = ["FIGURES", "figure_names", "make_figure", "save_figures"]
+
+DPI: Final = 200
+"""Dots per inch of the PNG files."""
+
+FIGURES: Final[dict[str, Callable[[GaitSeries, Reference | None], Figure]]] = {
+    "stick_figures": stick_figures,
+    "joint_angles": joint_angles,
+    "joint_moments": joint_moments,
+    "ground_forces": ground_forces,
+    "activations": activations,
+    "ankle_torque": ankle_torque,
+    "orthosis_curves": orthosis_curves,
+}
+"""Names of the figures and what makes them."""
+
+# Neither a date nor a version: the same stride gives the same bytes.
+_METADATA: Final[dict[str, dict[str, str | None]]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+}
+
+
+def figure_names(series: GaitSeries) -> tuple[str, ...]:
+    """Return the figures that make sense for a stride: no orthosis curve when barefoot."""
+    worn = series.walker.orthosis is not None
+    return tuple(name for name in FIGURES if worn or name != "orthosis_curves")
+
+
+def make_figure(name: str, series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return a figure in the common style.
+
+    Args:
+        name: A key of `FIGURES`.
+        series: The stride.
+        reference: Recorded bands to draw behind.
+    """
+    with mpl.rc_context(STYLE):
+        return FIGURES[name](series, reference)
+
+
+def save_figures(
+    series: GaitSeries,
+    folder: str | Path,
+    reference: Reference | None = None,
+    formats: Sequence[str] = ("png", "svg"),
+) -> tuple[str, ...]:
+    """Save every figure of a stride and return the file names.
+
+    Args:
+        series: The stride.
+        folder: Where; made if it does not exist.
+        reference: Recorded bands to draw behind.
+        formats: "png", "svg" or both.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    saved = []
+    for name in figure_names(series):
+        figure = make_figure(name, series, reference)
+        for extension in formats:
+            saved.append(f"{name}.{extension}")
+            _save(figure, folder / saved[-1], extension)
+    return tuple(saved)
+
+
+def _save(figure: Figure, path: Path, extension: str) -> None:
+    """Save a figure in one stroke; its layout is settled by the first format."""
+    with mpl.rc_context(STYLE), atomic_path(path) as temporary:
+        figure.savefig(temporary, format=extension, dpi=DPI, metadata=_METADATA[extension])
+    figure.set_layout_engine("none")

@@ -1,0 +1,119 @@
+"""Tables of recorded gait for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from rich.table import Table
+
+from pathwalker_cli.inverse.evaluate import StudyTrial
+from pathwalker_cli.inverse.study_tables import ResidualTable, StrengthTable
+
+__all__ = [
+    "residuals_renderable",
+    "stance_notes",
+    "strengths_renderable",
+    "trial_warnings",
+    "trials_renderable",
+]
+
+
+def trials_renderable(trials: Iterable[StudyTrial]) -> Table:
+    """Return one row per trial: length, cycles, measured stances, distance of the markers."""
+    table = Table(title="Trials", title_justify="left")
+    for name in ("condition", "trial", "frames", "strides", "measured stances", "markers [mm]"):
+        table.add_column(name, justify="left" if name in ("condition", "trial") else "right")
+    for trial in trials:
+        seen = [item.stance.side for item in trial.stances if item.measured]
+        counts = [f"{seen.count(side)} {side}" for side in ("right", "left") if side in seen]
+        distance = f"{1e3 * trial.markers.mean:.1f}" if trial.markers else "-"
+        table.add_row(trial.condition, trial.name, str(trial.motion.time.size),
+                      str(len(trial.cycles)), ", ".join(counts) or "-", distance)  # fmt: skip
+    return table
+
+
+def residuals_renderable(tables: Sequence[ResidualTable]) -> Table:
+    """Return mean residuals per trial and over trials, in N and N m and per kg."""
+    table = Table(title="Pelvis residuals, means over frames", title_justify="left")
+    for name in ("condition", "part", "trial", "frames"):
+        table.add_column(name, justify="right" if name == "frames" else "left")
+    for name in ("forward\n[N]", "up\n[N]", "moment\n[N m]"):
+        table.add_column(name, justify="right")
+    for name in ("forward\n[N/kg]", "up\n[N/kg]", "moment\n[N m/kg]"):
+        table.add_column(name, justify="right", style="dim")
+    for block in tables:
+        for item in block.trials:
+            table.add_row(block.condition, block.part, item.trial, str(item.frames),
+                          *_values(item.mean, block.body_mass))  # fmt: skip
+        if block.range is not None:
+            found = block.range
+            spans = (("mean", found.mean), ("min", found.lowest), ("max", found.highest))
+            for name, values in spans:
+                table.add_row(block.condition, block.part, name, "",
+                              *_values(values, block.body_mass), style="bold",
+                              end_section=name == "max")  # fmt: skip
+    return table
+
+
+def strengths_renderable(found: StrengthTable) -> Table:
+    """Return all strengths beside those of the patient's file."""
+    table = Table(title="Strengths at 90 % activation", title_justify="left")
+    columns = {"generator": "left", "here\n[N m]": "right", "patient\nfile [N m]": "right",
+               "deviation": "right", "stances": "right", "remark": "left"}  # fmt: skip
+    for name, justify in columns.items():
+        table.add_column(name, justify="right" if justify == "right" else "left")
+    for row in found.rows:
+        table.add_row(
+            row.generator,
+            f"{row.value:.2f}",
+            "-" if row.given is None else f"{row.given:.2f}",
+            "-" if row.deviation is None else f"{row.deviation:+.0%}",
+            "" if row.peak is None else str(row.peak.count),
+            row.remark,
+        )
+    return table
+
+
+def trial_warnings(trials: Iterable[StudyTrial], height: float, share: float) -> tuple[str, ...]:
+    """Return a sentence for everything about the trials that the user should know.
+
+    Args:
+        trials: The trials.
+        height: Height of the patient [m].
+        share: Mean distance of the markers that is a warning, as a share of the height.
+    """
+    found = []
+    for trial in trials:
+        if trial.markers is not None and trial.markers.mean > share * height:
+            found.append(
+                f"{trial.name}: markers lie {1e3 * trial.markers.mean:.0f} mm from the walker on "
+                f"average (usual: below {1e3 * share * height:.0f} mm at a height of {height:g} "
+                "m): is this the patient's file, and the condition that was recorded?"
+            )
+        for gap in trial.gaps:
+            if not gap.bridged:
+                found.append(
+                    f"{trial.name}: marker {gap.marker} is not seen in frames {gap.first} to "
+                    f"{gap.first + gap.frames - 1}; the others carry the fit there"
+                )
+        if trial.markers is not None and trial.forces is None:
+            found.append(f"{trial.name}: has no force plates, so there are no forces")
+        if not trial.cycles:
+            found.append(f"{trial.name}: shows no complete gait cycle, so it is in no figure")
+    return tuple(found)
+
+
+def stance_notes(trials: Iterable[StudyTrial]) -> tuple[str, ...]:
+    """Return a sentence for every stance that a plate felt but that is not measured."""
+    return tuple(
+        f"{trial.name}: {item.stance.side} stance from frame {item.stance.strike}: {item.reason}"
+        for trial in trials
+        for item in trial.stances
+        if not item.measured and item.plate is not None
+    )
+
+
+def _values(mean: np.ndarray, mass: float) -> list[str]:
+    """Return three values and the same per kg as text."""
+    return [f"{x:.2f}" for x in mean] + [f"{x:.3f}" for x in mean / mass]

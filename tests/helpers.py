@@ -1,0 +1,71 @@
+"""A stride without a solve: the stylised gait as a motion in phases with simple forces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, Condition
+from pathwalker_cli.model.contact import PHASES, ContactPhase
+from pathwalker_cli.model.walker import Walker, build_walker
+from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times
+from pathwalker_cli.ocp.series import GaitSeries, gait_series
+from pathwalker_cli.ocp.stylised import StylisedGait, stylised_trajectory
+from pathwalker_cli.patient import load_patient
+from pathwalker_cli.trajectory import Trajectory
+
+ACTIVATION = 0.25
+FRICTION = 0.1
+INTERVALS, DEGREE = 4, 3
+STIFFNESS = np.array([50.0, 60.0, 10.0, 20.0])
+GAIT = StylisedGait(walking_speed=0.6, stride_length=0.66)
+
+
+@cache
+def walker_of(condition: Condition) -> Walker:
+    """Return the published patient in a condition."""
+    return build_walker(load_patient("sreenivasa2017-patient"), condition)
+
+
+@cache
+def stylised_series(condition: Condition = "orthosis") -> GaitSeries:
+    """Return the stylised gait; its forces carry the weight at every instant."""
+    walker = walker_of(condition)
+    trajectory = stylised_trajectory(walker, GAIT)
+    starts = np.concatenate([[0.0], np.cumsum(GAIT.durations)[:-1]])
+    phases = tuple(
+        _phase(walker, phase, trajectory, start, duration)
+        for phase, start, duration in zip(PHASES, starts, GAIT.durations, strict=True)
+    )
+    parameters = STIFFNESS if walker.orthosis else np.zeros(0)
+    series = gait_series(walker, PhasedMotion(phases, parameters))
+    # At time 0 a series solves for the forces; here they are those of the first phase.
+    return replace(series, force=np.concatenate([series.force[1:2], series.force[1:]]))
+
+
+def _phase(
+    walker: Walker, contact: ContactPhase, trajectory: Trajectory, start: float, duration: float
+) -> PhaseMotion:
+    mesh = np.linspace(0.0, 1.0, INTERVALS + 1)
+    points = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation_times(DEGREE)
+    nodes, inner = (
+        np.column_stack([trajectory.at(t), trajectory.rates_at(t)])
+        for t in (start + duration * mesh, start + duration * points.ravel())
+    )
+    share = walker.weight / len(contact.points)
+    force = np.array([share * (FRICTION if f.endswith("x") else 1.0) for f in contact.forces])
+    zeros = np.zeros(len(COORDINATES))
+    algebraic = np.tile(np.concatenate([zeros, force, zeros]), (INTERVALS, DEGREE, 1))
+    return PhaseMotion(
+        name=contact.name,
+        duration=float(duration),
+        mesh=mesh,
+        states=nodes,
+        smooth=np.full((INTERVALS + 1, len(GENERATORS)), ACTIVATION),
+        controls=np.zeros((INTERVALS + 1, len(GENERATORS))),
+        integrals=np.zeros((INTERVALS + 1, 4)),
+        inner_states=inner.reshape(INTERVALS, DEGREE, -1),
+        algebraic=algebraic,
+    )

@@ -1,0 +1,204 @@
+"""Force plates: known loads on made plates, and which stances count as measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pathwalker_cli.conventions import COORDINATES, GRAVITY
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.direction import WalkingPlane
+from pathwalker_cli.inverse.filters import low_pass, smooth_rates
+from pathwalker_cli.inverse.forces import foot_extents, ground_forces
+from pathwalker_cli.inverse.plates import centre_of_pressure, plate_load, wrench_axis_at_ground
+from pathwalker_cli.inverse.process import process_trial
+from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
+from pathwalker_cli.model.urdf import pinocchio_model
+from pathwalker_cli.patient import load_patient
+from pathwalker_cli.trajectory import Trajectory
+
+RECORDINGS = Path(__file__).parents[2] / "shared" / "recordings"
+A, B, DEPTH = 0.175, 0.275, 0.027
+CORNERS = np.array([[0.2, 0.3, 0.0], [-0.2, 0.3, 0.0], [-0.2, -0.3, 0.0], [0.2, -0.3, 0.0]])
+FRAMES, PER_FRAME = 120, 9
+
+
+def channels(force: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Return the eight channels of a plate at the origin under a force at a surface point.
+
+    Args:
+        force: Force on the body in the plate's axes [N], shape (n, 3).
+        point: Point (x, y) on the surface [m], shape (n, 2).
+    """
+    fx, fy, fz = force.T
+    mx = fz * point[:, 1] + DEPTH * fy
+    my = -fz * point[:, 0] - DEPTH * fx
+    mz = fy * point[:, 0] - fx * point[:, 1]
+    s, d = mx / B, my / A
+    z = [(fz + s - d) / 4, (fz + s + d) / 4, (fz - s + d) / 4, (fz - s - d) / 4]
+    twist = mz / (2 * A)
+    return np.stack([fx / 2, fx / 2, fy / 2 + twist, fy / 2 - twist, *z], axis=1)
+
+
+def plate(force: np.ndarray, point: np.ndarray, corners: np.ndarray = CORNERS) -> ForcePlate:
+    """Return a made plate under a load given in its own axes."""
+    return ForcePlate("made", corners, A, B, DEPTH, channels(force, point))
+
+
+def test_load_and_centre_of_pressure_are_found() -> None:
+    rng = np.random.default_rng(2)
+    force = np.column_stack([rng.normal(size=(20, 2)) * 30.0, rng.uniform(100, 300, 20)])
+    point = rng.uniform(-0.1, 0.1, size=(20, 2))
+    load = plate_load(plate(force, point))
+    assert load.force == pytest.approx(force)
+    assert centre_of_pressure(load, 20.0)[:, :2] == pytest.approx(point, abs=1e-12)
+
+
+def test_axes_of_a_turned_plate() -> None:
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    moved = CORNERS @ turn.T + np.array([1.0, 2.0, 0.0])
+    force, point = np.array([[10.0, 20.0, 200.0]]), np.array([[0.05, -0.1]])
+    load = plate_load(plate(force, point, moved))
+    assert load.force[0] == pytest.approx(turn @ force[0])
+    expected = turn @ np.array([0.05, -0.1, 0.0]) + np.array([1.0, 2.0, 0.0])
+    assert centre_of_pressure(load, 20.0)[0] == pytest.approx(expected)
+
+
+def test_published_centre_ignores_the_depth() -> None:
+    force, point = np.array([[40.0, 0.0, 200.0]]), np.array([[0.05, 0.0]])
+    published = wrench_axis_at_ground(plate_load(plate(force, point)))[0, 0]
+    assert published - 0.05 == pytest.approx(DEPTH * 0.2 + 0.05 * (1 / 1.04 - 1), abs=1e-3)
+
+
+def test_unloaded_plate_has_no_centre() -> None:
+    load = plate_load(plate(np.array([[0.0, 0.0, 5.0]]), np.zeros((1, 2))))
+    assert np.isnan(centre_of_pressure(load, 20.0)).all()
+
+
+def test_filter_has_no_lag_and_rates_are_right() -> None:
+    time = np.arange(600) / 120.0
+    wave = np.sin(2.0 * np.pi * time)[:, None]
+    middle = slice(60, -60)
+    assert low_pass(wave, 120.0, 10.0)[middle] == pytest.approx(wave[middle], abs=2e-3)
+    noise = np.sin(2.0 * np.pi * 40.0 * time)[:, None]
+    assert np.abs(low_pass(noise, 120.0, 6.0)[60:-60]).max() < 1e-3
+    motion = Trajectory(time, ("hip_r",), wave, ("rad",))
+    q, v, vdot = smooth_rates(motion)
+    speed = 2.0 * np.pi * np.cos(2.0 * np.pi * time)[:, None]
+    assert q[middle] == pytest.approx(wave[middle], abs=2e-3)
+    assert v[middle] == pytest.approx(speed[middle], abs=0.02)
+    assert vdot[middle] == pytest.approx(-4.0 * np.pi**2 * wave[middle], abs=0.1)
+
+
+@cache
+def standing() -> tuple[pin.Model, Trajectory, float]:
+    """Return the walker standing still for a second, and where its right heel is [m]."""
+    model = pinocchio_model(load_patient("sreenivasa2017-patient"), "barefoot")
+    q = np.zeros((FRAMES, 10))
+    q[:, 1] = 0.65
+    q[:, 6] = -0.8
+    motion = Trajectory(np.arange(FRAMES) / 120.0, COORDINATES, q, ("m", "m", *["rad"] * 8))
+    return model, motion, float(foot_extents(model, q[:1])["right"][0, 0])
+
+
+def recording(share: float = 1.0, shift: float = 0.0, late: int = 0) -> Recording:
+    """Return a recording in which the right foot stands on a plate from frame 30 to 90.
+
+    Args:
+        share: Share of body weight that the plate carries.
+        shift: How far the load lies in front of the heel, beyond 0.05 m [m].
+        late: Frames by which the load outlasts the stance.
+    """
+    model, _, heel = standing()
+    weight = GRAVITY * pin.computeTotalMass(model)
+    loaded = np.zeros(FRAMES * PER_FRAME)
+    loaded[30 * PER_FRAME : (90 + late) * PER_FRAME] = share * weight
+    force = np.column_stack([0.1 * loaded, 0.0 * loaded, loaded])
+    point = np.tile([heel + 0.05 + shift, 0.0], (loaded.size, 1))
+    events = (
+        Event("left", "toe_off", 32),
+        Event("right", "foot_strike", 30),
+        Event("left", "foot_strike", 88),
+        Event("right", "toe_off", 90),
+        Event("right", "foot_strike", 110),
+    )
+    blank = np.zeros((FRAMES, 0, 3))
+    loaded_plate = plate(force, point)
+    noisy = replace(loaded_plate, channels=loaded_plate.channels + 1.5)
+    return Recording("made", 120.0, (), blank, events, (noisy,), PER_FRAME)
+
+
+def test_force_of_a_clean_stance() -> None:
+    model, motion, heel = standing()
+    forces = ground_forces(recording(), model, motion)
+    assert [item.reason for item in forces.stances] == [""]
+    assert forces.plane.name == "+x"
+    weight = GRAVITY * pin.computeTotalMass(model)
+    assert forces.force["right"][40:80, 1] == pytest.approx(weight, rel=0.01)
+    assert forces.force["right"][40:80, 0] == pytest.approx(0.1 * weight, rel=0.01)
+    assert forces.centre["right"][40:80] == pytest.approx(heel + 0.05, abs=1e-3)
+    assert forces.force["right"][95:108] == pytest.approx(0.0, abs=0.0), "in the air"
+    assert np.isnan(forces.force["right"][:20]).all(), "not measured"
+    assert forces.force["left"][40:80] == pytest.approx(0.0, abs=0.0)
+    assert np.isnan(forces.force["left"][95:]).all()
+
+
+@pytest.mark.parametrize(
+    ("made", "reason"),
+    [
+        ({"share": 0.2}, "no plate below the foot"),
+        ({"share": 0.7}, "carries 70% of the body"),
+        ({"shift": 0.3}, "load not under the foot"),
+        ({"late": 15}, "loaded before or after"),
+    ],
+)
+def test_doubtful_stances_are_not_measured(made: dict[str, float], reason: str) -> None:
+    model, motion, _ = standing()
+    ahead = WalkingPlane(axis=0, sign=1)
+    forces = ground_forces(recording(**made), model, motion, ahead)  # type: ignore[arg-type]
+    assert reason in forces.stances[0].reason
+    assert np.isnan(forces.force["right"][40:80]).all()
+
+
+def test_columns_of_the_table() -> None:
+    model, motion, _ = standing()
+    table = ground_forces(recording(), model, motion).trajectory()
+    assert table.names == (
+        "force_r_x", "force_r_z", "cop_r_x", "force_l_x", "force_l_z", "cop_l_x"
+    )  # fmt: skip
+    assert table.units == ("N", "N", "m") * 2
+
+
+def test_no_plates_is_an_error() -> None:
+    model, motion, _ = standing()
+    with pytest.raises(DataError, match="no force plates"):
+        ground_forces(replace(recording(), plates=()), model, motion)
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs shared/recordings beside the checkout")
+@pytest.mark.parametrize(
+    ("trial", "direction", "measured"),
+    [
+        ("barefoot/3053176", "+y", "l"),
+        ("barefoot/3053179", "-y", "rl"),
+        ("barefoot/3053183", "+y", "r"),
+        ("barefoot/3053184", "-y", "l"),
+        ("orthosis/3053141", "-y", "lr"),
+        ("orthosis/3053144", "-y", "rl"),
+        ("orthosis/3053146", "-y", "l"),
+        ("orthosis/3053148", "+y", "lr"),
+    ],
+)
+def test_recorded_stances(trial: str, direction: str, measured: str) -> None:
+    patient = load_patient("sreenivasa2017-patient")
+    condition = "orthosis" if trial.startswith("orthosis") else "barefoot"
+    forces = process_trial(RECORDINGS / f"{trial}.c3d", patient, condition).forces
+    assert forces is not None
+    assert forces.plane.name == direction
+    found = [item for item in forces.stances if item.measured]
+    assert "".join(item.stance.side[0] for item in found) == measured
