@@ -1,16 +1,16 @@
-"""Study configs: YAML in, validated frozen models out; every numerical choice has its place here."""
+"""Study configs: YAML in, validated frozen models out; every numerical choice has its place."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from pathwalker_cli.conventions import COORDINATES, Condition
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
-from pathwalker_cli.io.yaml_file import read_mapping, validate
+from pathwalker_cli.io.yaml_file import read_mapping, read_value, validate
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient_blocks import Stiffness
@@ -24,8 +24,11 @@ __all__ = [
     "SolverConfig",
     "StartConfig",
     "StudyConfig",
+    "apply_change",
     "condition_of",
+    "find_config",
     "load_config",
+    "patient_path",
     "smoke_version",
 ]
 
@@ -46,6 +49,11 @@ def _ordered(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
+def _as_text(value: Any) -> Any:
+    """Let names of trials that look like numbers be names."""
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
 class ModelConfig(YamlModel):
     """Which model is built."""
 
@@ -57,8 +65,8 @@ class CostConfig(YamlModel):
     """Weights of the cost terms."""
 
     effort_weight: Weight = 1.0
-    rate_weight: Weight = 1e-3
-    acceleration_weight: Weight = 0.0
+    rate_weight: Weight = 2e-2
+    acceleration_weight: Weight = 5e-4
     walking_speed_weight: Weight = 0.0
 
 
@@ -123,8 +131,8 @@ class MeshConfig(YamlModel):
 
     degree: Annotated[int, Field(ge=2, le=6)] = 3
     start_intervals_per_phase: Annotated[int, Field(ge=2, le=50)] = 4
-    intervals: Annotated[int, Field(ge=0, le=1000)] = 64
-    least_intervals_per_phase: Annotated[int, Field(ge=1, le=50)] = 3
+    intervals: Annotated[int, Field(ge=0, le=1000)] = 80
+    least_intervals_per_phase: Annotated[int, Field(ge=1, le=50)] = 5
     position_tolerance: Annotated[float, Quantity("rad or m", 1e-8, 1.0)] = 1e-3
     velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2
     refinements: Annotated[int, Field(ge=0, le=20)] = 5
@@ -134,7 +142,7 @@ class StartConfig(YamlModel):
     """Where the search begins."""
 
     gait: Literal["synthetic", "recorded"] = "synthetic"
-    trial: str = ""
+    trial: Annotated[str, BeforeValidator(_as_text)] = ""
     condition: Condition = "barefoot"
     knee_flexion: Annotated[float, Quantity("rad", 0.05, 1.5, above="is it in degrees?")] = 0.7
     stride_ratio: Annotated[float, Quantity("leg lengths", 0.3, 3.0)] = 1.1
@@ -147,7 +155,8 @@ class SolverConfig(YamlModel):
     coarse_tolerance: Annotated[float, Quantity("", 1e-12, 1e-1)] = 1e-3
     constraint_tolerance: Annotated[float, Quantity("", 1e-12, 1e-3)] = 1e-9
     max_iterations: Annotated[int, Field(ge=1, le=100000)] = 1000
-    fine_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-4
+    fine_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-3
+    refined_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-6
     ipopt: dict[str, float | int | str] = Field(default_factory=dict)
 
 
@@ -197,9 +206,7 @@ def condition_of(problem: str) -> Condition:
     return PROBLEMS[problem]
 
 
-def load_config(
-    path: str | Path, problem: str = "", changes: tuple[str, ...] = ()
-) -> StudyConfig:
+def load_config(path: str | Path, problem: str = "", changes: tuple[str, ...] = ()) -> StudyConfig:
     """Read a study config.
 
     Args:
@@ -210,10 +217,10 @@ def load_config(
     Raises:
         ConfigError: If file or overrides are wrong.
     """
-    source = _find(Path(path))
+    source = find_config(Path(path))
     mapping, lines = read_mapping(source, ConfigError)
     for change in changes:
-        _apply(mapping, change)
+        apply_change(mapping, change)
     config = validate(mapping, StudyConfig, where=str(path), error=ConfigError, lines=lines)
     if problem and config.problem != problem:
         raise ConfigError(
@@ -221,10 +228,10 @@ def load_config(
             where=f"{path}, problem",
             mend=f"use configs/{problem}.yaml, or ask for {config.problem}",
         )
-    return config.model_copy(update={"patient": _patient_path(config.patient, source)})
+    return config.model_copy(update={"patient": patient_path(config.patient, source)})
 
 
-def _find(path: Path) -> Path:
+def find_config(path: Path) -> Path:
     """Return the file, or the shipped config of that name where there is no such file."""
     if not path.exists():
         for name in (path.name, f"{path.name}.yaml"):
@@ -234,25 +241,18 @@ def _find(path: Path) -> Path:
     return path
 
 
-def _patient_path(patient: str, config_file: Path) -> str:
+def patient_path(patient: str, config_file: Path) -> str:
     """Return a patient path relative to the config's folder as a full path; ids stay."""
     candidate = config_file.parent / patient
     return str(candidate.resolve()) if "/" in patient or candidate.is_file() else patient
 
 
-def _apply(mapping: dict[str, Any], change: str) -> None:
+def apply_change(mapping: dict[str, Any], change: str) -> None:
     """Put one override "a.b=value" into a mapping; the value is read as YAML."""
-    import yaml
-
     key, equals, text = change.partition("=")
     if not equals or not key.strip():
         raise ConfigError(f"'{change}' is no override", where="--set", allowed="dotted.key=value")
-    try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
-        raise ConfigError(f"'{text}' is not a YAML value", where=f"--set {key}") from None
-    if isinstance(value, str):
-        value = _number(value)
+    value = read_value(text, f"--set {key}")
     *parents, last = key.strip().split(".")
     for parent in parents:
         mapping = mapping.setdefault(parent, {})
@@ -261,18 +261,11 @@ def _apply(mapping: dict[str, Any], change: str) -> None:
     mapping[last] = value
 
 
-def _number(text: str) -> str | float:
-    """Return 1e-4 and the like as numbers: YAML 1.1 takes them for text."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
 def smoke_version(config: StudyConfig) -> StudyConfig:
     """Return a config with a short horizon for quick checks: coarse mesh, no refinement."""
     mesh = config.mesh.model_copy(
         update={"start_intervals_per_phase": 2, "intervals": 0, "refinements": 0}
     )
-    solver = config.solver.model_copy(update={"coarse_tolerance": 1e-3, "max_iterations": 400})
+    fewer = min(400, config.solver.max_iterations)
+    solver = config.solver.model_copy(update={"max_iterations": fewer})
     return config.model_copy(update={"mesh": mesh, "solver": solver, "smoke": True})

@@ -8,8 +8,8 @@ __all__ = [
     "DataError",
     "InputError",
     "NotConvergedError",
-    "PatientError",
     "PathwalkerError",
+    "PatientError",
 ]
 
 

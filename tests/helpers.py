@@ -10,6 +10,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, Condition
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 from pathwalker_cli.model.walker import Walker, build_walker
+from pathwalker_cli.ocp.gait import INTEGRALS
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times
 from pathwalker_cli.ocp.series import GaitSeries, gait_series
 from pathwalker_cli.ocp.stylised import StylisedGait, stylised_trajectory
@@ -65,7 +66,7 @@ def _phase(
         states=nodes,
         smooth=np.full((INTERVALS + 1, len(GENERATORS)), ACTIVATION),
         controls=np.zeros((INTERVALS + 1, len(GENERATORS))),
-        integrals=np.zeros((INTERVALS + 1, 4)),
+        integrals=np.zeros((INTERVALS + 1, len(INTEGRALS))),
         inner_states=inner.reshape(INTERVALS, DEGREE, -1),
         algebraic=algebraic,
     )

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import Field, field_validator, model_validator
 
 # The lookup of files, overrides and patients is the same for all configs.
-from pathwalker_cli.config import _apply, _find, _patient_path
+from pathwalker_cli.config import apply_change, find_config, patient_path
 from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.inverse.filters import MOTION_CUTOFF
@@ -143,15 +143,15 @@ def load_inverse_dynamics(path: str | Path, changes: tuple[str, ...] = ()) -> In
 
 def _load(path: str | Path, changes: tuple[str, ...], model_class: type[Config]) -> Config:
     """Read a config; its paths are relative to its own folder where something is there."""
-    source = _find(Path(path))
+    source = find_config(Path(path))
     mapping, lines = read_mapping(source, ConfigError)
     for change in changes:
-        _apply(mapping, change)
+        apply_change(mapping, change)
     config = validate(mapping, model_class, where=str(path), error=ConfigError, lines=lines)
     beside = source.parent
     paths = {c: tuple(_placed(p, beside) for p in config.c3d.of(c)) for c in config.conditions}
     changed = {
-        "patient": _patient_path(config.patient, source),
+        "patient": patient_path(config.patient, source),
         "c3d": Paths(**paths),
         "markers": _placed(config.markers, beside) if config.markers else None,
     }

@@ -87,6 +87,21 @@ def read_mapping(
     return content, lines
 
 
+def read_value(text: str, where: str, error: type[InputError] = ConfigError) -> Any:
+    """Return one value read as YAML, e.g. an override on the command line.
+
+    Raises:
+        InputError: Of class `error`, if the text is no YAML value.
+    """
+    loader = _Loader(text)
+    try:
+        return loader.get_single_data()
+    except (yaml.YAMLError, ValueError, RecursionError):
+        raise error(f"'{text}' is not a YAML value", where=where) from None
+    finally:
+        loader.dispose()
+
+
 def validate(
     mapping: Mapping[str, Any],
     model_class: type[Model],

@@ -9,7 +9,7 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -97,9 +97,9 @@ class AndersonCurves:
 
 def _numeric_chain(x: Any, y: Any, slopes: Any, curviness: float) -> BezierChain:
     """Return a chain of plain floats with just the Newton steps that it needs."""
-    knots = [tuple(float(value) for value in column) for column in (x, y, slopes)]
-    chain = BezierChain(*knots, curviness)
-    return BezierChain(*knots, curviness, newton_steps_for(chain))
+    knots = (tuple(float(value) for value in column) for column in (x, y, slopes))
+    chain = BezierChain(next(knots), next(knots), next(knots), curviness)
+    return replace(chain, newton_steps=newton_steps_for(chain))
 
 
 _ANDERSON: Final = {
@@ -199,11 +199,8 @@ def activation_rate(excitation: Any, activation: Any) -> Any:
     """
     difference = excitation - activation
     rising = excitation / ACTIVATION_TIME + (1 - excitation) / DEACTIVATION_TIME
-    if isinstance(difference, ca.SX | ca.MX):
-        factor = ca.if_else(difference >= 0, rising, 1 / DEACTIVATION_TIME)
-    else:
-        factor = np.where(difference >= 0, rising, 1 / DEACTIVATION_TIME)
-    return difference * factor
+    choose = ca.if_else if isinstance(difference, ca.SX | ca.MX) else np.where
+    return difference * choose(difference >= 0, rising, 1 / DEACTIVATION_TIME)
 
 
 def excitation_from_rate(rate: np.ndarray, activation: np.ndarray) -> np.ndarray:

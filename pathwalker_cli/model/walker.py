@@ -169,7 +169,7 @@ class Walker:
         return solution[:n], forces
 
     def contact_points(self, q: Any) -> np.ndarray:
-        """Return positions of right heel, right toe, left heel, left toe; x, z [m], shape (4, 2)."""
+        """Return right heel, right toe, left heel, left toe: x and z [m], shape (4, 2)."""
         q = _vector(q, 10, "q")
         return np.asarray(self.rigid_body.point_positions(q, self.rigid_body.parameters)).reshape(
             4, 2

@@ -80,15 +80,14 @@ class Block:
         return [ca.jacobian(self.constraints, self.unknowns), ca.sparsify(gradient)]
 
     def _function(self, kind: str, outputs: list[ca.SX], more: list[ca.SX]) -> ca.Function:
-        """Return a function in which the anchors are replaced by what they stand for."""
+        """Return a function in which the frozen symbols are replaced by what they stand for."""
         inputs = [self.unknowns, self.data, self.shared, *more]
         name = f"{self.name}_{kind}"
-        if not self.frozen.anchors:
+        if not self.frozen.symbols:
             return ca.Function(name, inputs, outputs)
-        anchors = self.frozen.anchor_vector
-        outer = ca.Function("with_anchors", [*inputs, anchors], outputs)
-        results = outer.call([*inputs, self.frozen.argument_vector], True, False)
-        return ca.Function(name, inputs, ca.cse(results))
+        outer = ca.Function("frozen", [*inputs, self.frozen.symbol_vector], outputs)
+        results = outer.call([*inputs, self.frozen.meaning_vector], True, False)
+        return ca.Function(name, inputs, results)
 
 
 @dataclass(frozen=True)
@@ -104,6 +103,9 @@ class Occurrences:
         row_scale: Physical units per row unit, shape (r,).
         row_names: Names of the rows, r of them.
         labels: Where each occurrence is, e.g. "left_flat at 40 %", count of them.
+        times: Instant of every row, shape (r, count); only differences within a series matter.
+        weights: Quadrature weight of every row, shape (r, count).
+        series: Rows of the same series sample one function of time; r names.
     """
 
     block: Block
@@ -114,6 +116,18 @@ class Occurrences:
     row_scale: np.ndarray
     row_names: Sequence[str]
     labels: Sequence[str]
+    times: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    series: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        """Let rows that stand at one instant only, or alone, be their own series."""
+        shape = (self.block.rows, self.count)
+        for name, default in (("times", 0.0), ("weights", 1.0)):
+            if not getattr(self, name).size:
+                object.__setattr__(self, name, np.full(shape, default))
+        if not self.series:
+            object.__setattr__(self, "series", tuple(map(str, range(self.block.rows))))
 
     @property
     def count(self) -> int:

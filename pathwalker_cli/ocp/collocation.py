@@ -16,7 +16,13 @@ import numpy as np
 from pathwalker_cli.ocp.blocks import Block, BlockProgram, Occurrences
 from pathwalker_cli.ocp.frozen import FrozenTerms
 from pathwalker_cli.ocp.layout import Layout
-from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times, lagrange_weights
+from pathwalker_cli.ocp.phased import (
+    PhasedMotion,
+    PhaseMotion,
+    collocation_times,
+    lagrange_weights,
+    quadrature_weights,
+)
 from pathwalker_cli.ocp.problem import (
     INFINITY,
     MultiPhaseProblem,
@@ -29,12 +35,10 @@ from pathwalker_cli.ocp.problem import (
 __all__ = ["CollocationBlocks", "CollocationProgram"]
 
 
-def _radau(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the points, the differentiation matrix (d, d + 1) and the quadrature weights (d,)."""
+def _differentiation(degree: int) -> np.ndarray:
+    """Return the matrix from start and points of an interval to rates at the points."""
     times = collocation_times(degree)
-    differentiation = lagrange_weights(np.concatenate([[0.0], times]), times, derivative=True)
-    moments = np.vander(times, degree, increasing=True).T
-    return times, differentiation, np.linalg.solve(moments, 1 / np.arange(1, degree + 1))
+    return lagrange_weights(np.concatenate([[0.0], times]), times, derivative=True)
 
 
 @dataclass(frozen=True)
@@ -112,7 +116,7 @@ class CollocationBlocks:
     def _substituted(
         self, phase: Phase, expressions: list[ca.SX], values: list[ca.SX], tag: str
     ) -> tuple[list[ca.SX], FrozenTerms]:
-        """Return a phase's expressions with its symbols replaced by values, anchors renewed."""
+        """Return a phase's expressions with its symbols replaced by values."""
         problem = self.problem
         symbols = [
             problem.states.symbol,
@@ -123,13 +127,16 @@ class CollocationBlocks:
             problem.shared,
             problem.point_data,
         ]
-        anchors = phase.frozen.anchor_vector
-        outer = ca.Function("expressions", [*symbols, anchors], expressions)
-        inner = ca.Function("arguments", symbols, [phase.frozen.argument_vector])
-        renewed = ca.SX.sym(f"anchors{tag}", anchors.numel())
-        (arguments,) = inner.call(values, True, False)
-        frozen = FrozenTerms([renewed], [arguments]) if anchors.numel() else FrozenTerms()
-        return outer.call([*values, renewed], True, False), frozen
+        frozen = phase.frozen
+        inputs = [*symbols, frozen.symbol_vector]
+        outer = ca.Function("expressions", inputs, expressions)
+        if not any(ca.depends_on(k, frozen.symbol_vector) for k in expressions if k.numel()):
+            unused = ca.SX.zeros(frozen.symbol_vector.numel())
+            return outer.call([*values, unused], True, False), FrozenTerms()
+        inner = ca.Function("meanings", symbols, [frozen.meaning_vector])
+        renewed = ca.SX.sym(f"frozen{tag}", frozen.symbol_vector.numel())
+        (meanings,) = inner.call(values, True, False)
+        return outer.call([*values, renewed], True, False), FrozenTerms([renewed], [meanings])
 
     def _interval_block(self, phase: Phase) -> Block:
         """Return collocation, smooth-state and integral rows of one interval.
@@ -137,7 +144,8 @@ class CollocationBlocks:
         Unknowns T, p, x0, (x_k, z_k) for all points, y0, u0, s0, y1, u1, s1.
         """
         problem, d = self.problem, self.degree
-        times, differentiation, weights = _radau(d)
+        differentiation = _differentiation(d)
+        times, weights = quadrature_weights(d)
         duration, fraction = ca.SX.sym("T"), ca.SX.sym("fraction")
         step = duration * fraction
         p, x0, _ = self._unknowns(phase, "0")
@@ -158,7 +166,7 @@ class CollocationBlocks:
                 slope += differentiation[k, j + 1] * other.scaled
             rows.append(slope - step * derivative / problem.states.scale)
             gain += weights[k] * integrands
-            frozen = FrozenTerms(frozen.anchors + more.anchors, frozen.arguments + more.arguments)
+            frozen = FrozenTerms(frozen.symbols + more.symbols, frozen.meanings + more.meanings)
         y_gain = step / 2 * (u0.value + u1.value) / problem.smooth.scale
         rows.append(y1.scaled - y0.scaled - y_gain)
         rows.append(s1.scaled - s0.scaled - step * gain / problem.integral_scale)
@@ -293,6 +301,11 @@ class CollocationProgram:
         head = np.array(np.broadcast_arrays(steps[:, None], times[None, :]))
         return fractions, np.concatenate([head, np.moveaxis(data, -1, 0)])
 
+    def _point_weights(self, i: int) -> np.ndarray:
+        """Return the quadrature weights of the points of a phase, shape (N, d)."""
+        _, weights = quadrature_weights(self.blocks.degree)
+        return np.asarray(np.diff(self.meshes[i])[:, None] * weights)
+
     def _point_rows(self, i: int, kind: str) -> Occurrences:
         phase = self.blocks.problem.phases[i]
         rows: Rows = getattr(phase, kind)
@@ -311,6 +324,8 @@ class CollocationProgram:
             rows.scale,
             rows.names,
             [self._label(i, f) for f in fractions.ravel()],
+            times=np.tile(fractions.ravel(), (len(rows.names), 1)),
+            weights=np.tile(self._point_weights(i).ravel(), (len(rows.names), 1)),
         )
 
     def _end_rows(self, i: int) -> Occurrences:
@@ -348,6 +363,9 @@ class CollocationProgram:
         names += [f"integral {s}" for s in problem.integrals]
         zeros = np.zeros((len(names), count))
         tail = (problem.smooth.scale, problem.integral_scale)
+        nx, rest = problem.states.size, problem.smooth.size + len(problem.integrals)
+        times, radau = quadrature_weights(d)
+        points_at = mesh[:-1, None] + np.diff(mesh)[:, None] * times
         return Occurrences(
             self.blocks.phases[i].interval,
             np.array(columns).T,
@@ -357,14 +375,24 @@ class CollocationProgram:
             np.concatenate([np.tile(problem.states.scale, d), *tail]),
             names,
             [self._label(i, f) for f in mesh[:-1]],
+            times=np.concatenate(
+                [np.repeat(points_at.T, nx, axis=0), np.tile(mesh[1:], (rest, 1))]
+            ),
+            weights=np.repeat([*radau, *[1.0] * rest], [nx] * d + [1] * rest)[:, None]
+            * np.ones(count),
+            series=tuple(name.split(" at point ")[0] for name in names),
         )
 
     def _node_rows(self) -> Occurrences:
         rows, layout = self.blocks.problem.node_rows, self.layout
         lower, upper = self._row_bounds(rows)
         count = len(layout.smooth)
-        labels = [""] * count
+        labels, times, weights = [""] * count, np.zeros(count), np.zeros(count)
         for i, places in enumerate(layout.phases):
+            steps = np.diff(self.meshes[i])
+            weights[places.nodes[:-1]] += steps / 2
+            weights[places.nodes[1:]] += steps / 2
+            times[places.nodes] = i + self.meshes[i]
             for node, fraction in zip(places.nodes, self.meshes[i], strict=True):
                 labels[node] = self._label(i, fraction)
         return Occurrences(
@@ -376,6 +404,8 @@ class CollocationProgram:
             rows.scale,
             rows.names,
             labels,
+            times=np.tile(times, (len(rows.names), 1)),
+            weights=np.tile(weights, (len(rows.names), 1)),
         )
 
     def _boundary_rows(self) -> Occurrences:

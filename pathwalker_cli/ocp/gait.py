@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Final
 
 import casadi as ca
@@ -29,7 +29,15 @@ from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME
 from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
 from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
 from pathwalker_cli.ocp.frozen import FrozenTerms
-from pathwalker_cli.ocp.problem import INFINITY, Boundary, MultiPhaseProblem, Phase, Rows, Variables
+from pathwalker_cli.ocp.problem import (
+    INFINITY,
+    Boundary,
+    Instant,
+    MultiPhaseProblem,
+    Phase,
+    Rows,
+    Variables,
+)
 
 __all__ = ["INTEGRALS", "STIFFNESSES", "WEIGHTS", "GaitProblem", "GaitWeights"]
 
@@ -133,13 +141,15 @@ def _curve_expansion(chain: BezierChain, sign: float, x: ca.SX) -> tuple[ca.SX, 
     return point.value, sign * point.slope, point.curvature
 
 
-def _orthosis_expansion(
-    side: OrthosisSide, angle: ca.SX, k_d: ca.SX, k_p: ca.SX
-) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _orthosis_expansion(side: OrthosisSide, *arguments: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Return orthosis torque, its gradient and its Hessian in angle, K_D and K_P."""
-    torque = orthosis_torque(side, angle, k_d, k_p)
-    hessian, gradient = ca.hessian(torque, ca.vertcat(angle, k_d, k_p))
-    return torque, gradient, hessian
+    x = ca.SX.sym("x", 3)
+    parameters = ca.vertcat(*vars(side).values())
+    torque = orthosis_torque(side, *ca.vertsplit(x))
+    hessian, gradient = ca.hessian(torque, x)
+    terms = ca.Function("orthosis", [x, parameters], [torque, gradient, hessian])
+    value, slope, bend = terms(ca.vertcat(*arguments), parameters)
+    return value, slope, bend
 
 
 class GaitProblem:
@@ -199,39 +209,30 @@ class GaitProblem:
         """
         return self.constants.values(self.walker, weights, friction, orthosis_share)
 
-    def torques(self, frozen: FrozenTerms) -> tuple[ca.SX, ca.SX]:
-        """Return muscle torques (14,) and orthosis torques (2,) with frozen curves [N m]."""
-        muscle = []
+    @cached_property
+    def _torques(self) -> tuple[ca.SX, FrozenTerms]:
+        """Generalised forces of muscles and orthoses (10,) [N m], with frozen curves."""
+        tau, frozen = ca.SX(len(COORDINATES), 1), FrozenTerms()
         for i, (g, row) in enumerate(zip(self.walker.generators, GENERATOR_ROWS, strict=True)):
             angle = partial(_curve_expansion, g.curves.active_torque_angle, g.angle_sign)
             speed = partial(_curve_expansion, g.curves.torque_angular_velocity, g.torque_sign)
             factor = frozen.taylor(angle, self.q[row]) * frozen.taylor(speed, self.v[row])
             peak = g.torque_sign * self.constants.strength[i]
-            muscle.append(peak * self.activations.symbol[i] * factor)
-        orthosis = [
-            frozen.taylor(
-                partial(_orthosis_expansion, side),
-                self.q[row],
-                self.stiffness.symbol[i],
-                self.stiffness.symbol[i + 2],
-            )
-            for i, (side, row) in enumerate(zip(self.constants.sides, ANKLES, strict=False))
-        ]
-        return ca.vertcat(*muscle), ca.vertcat(*orthosis) if orthosis else ca.SX.zeros(2)
+            tau[row] += peak * self.activations.symbol[i] * factor
+        for i, (side, row) in enumerate(zip(self.constants.sides, ANKLES, strict=False)):
+            springs = self.stiffness.symbol[i], self.stiffness.symbol[i + 2]
+            expansion = partial(_orthosis_expansion, side)
+            tau[row] += frozen.taylor(expansion, self.q[row], *springs)
+        return tau, frozen
 
     def _phase(self, contact: ContactPhase, following: ContactPhase) -> Phase:
-        body, theta, frozen = self.walker.rigid_body, self.constants.theta, FrozenTerms()
+        body, theta = self.walker.rigid_body, self.constants.theta
         names = ACCELERATIONS + contact.forces + RESERVES
         counts = [len(ACCELERATIONS), len(contact.forces), len(RESERVES)]
         scale = np.repeat([_ACCELERATION, _FORCE, _TORQUE], counts)
         z = Variables.make("z", names, scale)
         vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
-        muscle, orthosis = self.torques(frozen)
-        tau = ca.SX(len(COORDINATES), 1)
-        for row, torque in zip(GENERATOR_ROWS, ca.vertsplit(muscle), strict=True):
-            tau[row] += torque
-        for row, torque in zip(ANKLES, ca.vertsplit(orthosis), strict=True):
-            tau[row] += torque
+        tau, frozen = self._torques
         active = list(contact.indices)
         jacobian = body.point_jacobian(self.q, theta)[active, :]
         balance = body.inverse_dynamics(self.q, self.v, vdot, theta) - tau - reserve
@@ -307,7 +308,9 @@ class GaitProblem:
                 motion["position"][lifts], tuple(f"{n[:-2]} touch-down" for n in vertical), _HEIGHT
             ),
             Rows.make(
-                motion["velocity"][index], tuple(f"{n} touch-down velocity" for n in directions), 1.0
+                motion["velocity"][index],
+                tuple(f"{n} touch-down velocity" for n in directions),
+                1.0,
             ),
             Rows.make(
                 motion["acceleration"][index],
@@ -348,8 +351,7 @@ class GaitProblem:
 
     def _boundary(self) -> Boundary:
         groups = (self.states, self.activations, self.rates)
-        first = tuple(ca.SX.sym(f"first{i}", group.size) for i, group in enumerate(groups))
-        last = tuple(ca.SX.sym(f"last{i}", group.size) for i, group in enumerate(groups))
+        first, last = _instant(groups, "first"), _instant(groups, "last")
         durations = ca.SX.sym("durations", len(PHASES))
         integrals = ca.SX.sym("integrals", len(INTEGRALS))
         distance, total = last[0][0] - first[0][0], ca.sum1(durations)
@@ -376,6 +378,10 @@ class GaitProblem:
         objective += weight["reserve"] * total_of["reserve"]
         objective += weight["smoothing"] * (total_of["effort"] + total_of["rate"])
         objective -= weight["walking_speed"] * distance / total
-        return Boundary(
-            first, last, durations, integrals, Rows.join(*periodic, free), objective
-        )
+        return Boundary(first, last, durations, integrals, Rows.join(*periodic, free), objective)
+
+
+def _instant(groups: tuple[Variables, Variables, Variables], label: str) -> Instant:
+    """Return fresh symbols for x, y and u at one instant."""
+    x, y, u = (ca.SX.sym(f"{label}{i}", group.size) for i, group in enumerate(groups))
+    return x, y, u

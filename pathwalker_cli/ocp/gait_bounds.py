@@ -65,9 +65,7 @@ def gait_bounds(walker: Walker, config: BoundsConfig) -> GaitBounds:
     return GaitBounds(BoundTable(entries), sources)
 
 
-def tracking_bounds(
-    bounds: GaitBounds, durations: np.ndarray, stiffness: np.ndarray
-) -> BoundTable:
+def tracking_bounds(bounds: GaitBounds, durations: np.ndarray, stiffness: np.ndarray) -> BoundTable:
     """Return the bounds of the first stage: given durations and stiffness, free reserves.
 
     Args:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
@@ -54,10 +54,20 @@ class IpoptSettings:
         }
         if self.warm_start:
             options["warm_start_init_point"] = "yes"
-            for key in ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"):
-                options[f"warm_start_{key}"] = 1e-9
-            options["warm_start_mult_bound_push"] = 1e-9
+            # a start on a bound is moved off it by about what the barrier would ask for
+            push = min(1e-4, 0.1 * self.initial_barrier)
+            for key in _WARM_PUSHES:
+                options[f"warm_start_{key}"] = push
         return {**options, **self.extra}
+
+
+_WARM_PUSHES = (
+    "bound_push",
+    "bound_frac",
+    "slack_bound_push",
+    "slack_bound_frac",
+    "mult_bound_push",
+)
 
 
 @dataclass(frozen=True)
@@ -161,7 +171,7 @@ class _Watcher(ca.Callback):
         count = {"f": 1, "x": size, "lam_x": size, "g": rows, "lam_g": rows}.get(name, parameters)
         return ca.Sparsity.dense(count)
 
-    def eval(self, arguments: list[ca.DM]) -> list[int]:
+    def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
         self.iteration += 1
         if self._observer is not None:
             g = np.asarray(arguments[2]).ravel()
@@ -214,7 +224,7 @@ def solve_program(
     """
     functions = program.program.functions()
     watcher = _Watcher(program, observer)
-    options = {
+    options: dict[str, Any] = {
         "ipopt": settings.as_options(),
         "print_time": False,
         "error_on_fail": False,

@@ -67,7 +67,9 @@ class Layout:
         """Return scaled lower and upper bounds of all unknowns."""
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
 
-        def put(places: np.ndarray, names: tuple[str, ...], phase: str = "", end: bool = False):
+        def put(
+            places: np.ndarray, names: tuple[str, ...], phase: str = "", end: bool = False
+        ) -> None:
             low, high = table.arrays(names, phase, end)
             lower[places], upper[places] = low, high
 
@@ -126,14 +128,19 @@ class _Builder:
                 inner.append([*points, nodes[-1][0]])
             numbers = np.arange(first, len(nodes))
             phases.append(PhasePlaces(numbers, np.array(inner), np.array(algebraic)))
-        columns = [np.array([node[k] for node in nodes]) for k in range(4)]
+        states, smooth, controls, integrals = (
+            np.array([node[k] for node in nodes]) for k in range(4)
+        )
         return Layout(
             len(self.scale),
             np.array(self.scale),
             tuple(self.names),
             durations,
             parameters,
-            *columns,
+            states,
+            smooth,
+            controls,
+            integrals,
             tuple(phases),
         )
 

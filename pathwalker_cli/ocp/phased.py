@@ -8,12 +8,25 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-__all__ = ["PhaseMotion", "PhasedMotion", "collocation_times", "lagrange_weights"]
+__all__ = [
+    "PhaseMotion",
+    "PhasedMotion",
+    "collocation_times",
+    "lagrange_weights",
+    "quadrature_weights",
+]
 
 
 def collocation_times(degree: int) -> np.ndarray:
     """Return the Radau points of an interval [0, 1], the last one at 1, shape (degree,)."""
     return np.array(ca.collocation_points(degree, "radau"))
+
+
+def quadrature_weights(degree: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the Radau points of [0, 1] and their quadrature weights, shape (degree,) each."""
+    times = collocation_times(degree)
+    moments = np.vander(times, degree, increasing=True).T
+    return times, np.linalg.solve(moments, 1 / np.arange(1, degree + 1))
 
 
 def lagrange_weights(nodes: np.ndarray, at: np.ndarray, derivative: bool = False) -> np.ndarray:
@@ -76,7 +89,9 @@ class PhaseMotion:
 
     def locate(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return interval numbers and local positions in [0, 1] of fractions of the phase."""
-        interval = np.clip(np.searchsorted(self.mesh, fractions, "right") - 1, 0, self.intervals - 1)
+        interval = np.clip(
+            np.searchsorted(self.mesh, fractions, "right") - 1, 0, self.intervals - 1
+        )
         local = (fractions - self.mesh[interval]) / np.diff(self.mesh)[interval]
         return interval, local
 
@@ -114,9 +129,9 @@ class PhaseMotion:
         points = (mesh[:-1, None] + np.diff(mesh)[:, None] * collocation_times(degree)).ravel()
         shape = (len(mesh) - 1, degree, -1)
         interval, local = self.locate(mesh)
-        integrals = self.integrals[interval] + local[:, None] * np.diff(self.integrals, axis=0)[
-            interval
-        ]
+        integrals = (
+            self.integrals[interval] + local[:, None] * np.diff(self.integrals, axis=0)[interval]
+        )
         return PhaseMotion(
             name=self.name,
             duration=self.duration,

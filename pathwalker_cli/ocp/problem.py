@@ -23,6 +23,7 @@ from pathwalker_cli.ocp.frozen import FrozenTerms
 __all__ = [
     "BoundTable",
     "Boundary",
+    "Instant",
     "MultiPhaseProblem",
     "Phase",
     "ProblemNumbers",
@@ -31,6 +32,9 @@ __all__ = [
 ]
 
 INFINITY = float("inf")
+
+Instant = tuple[ca.SX, ca.SX, ca.SX]
+"""States, smooth states and controls at one instant."""
 
 
 @dataclass(frozen=True)
@@ -143,8 +147,8 @@ class Boundary:
         objective: What is minimised, scalar SX.
     """
 
-    first: tuple[ca.SX, ca.SX, ca.SX]
-    last: tuple[ca.SX, ca.SX, ca.SX]
+    first: Instant
+    last: Instant
     durations: ca.SX
     integrals: ca.SX
     rows: Rows
@@ -193,9 +197,7 @@ class BoundTable:
 
     entries: Mapping[tuple[str, ...], tuple[float, float]]
 
-    def find(
-        self, name: str, phase: str = "", at_end: bool = False
-    ) -> tuple[float, float] | None:
+    def find(self, name: str, phase: str = "", at_end: bool = False) -> tuple[float, float] | None:
         """Return the bounds of a quantity, or None where the table has none."""
         keys: list[tuple[str, ...]] = [(name, phase, "end")] if at_end else []
         for key in [*keys, (name, phase), (name,)]:

@@ -18,6 +18,7 @@ from pathwalker_cli.ocp.collocation import CollocationBlocks, CollocationProgram
 from pathwalker_cli.ocp.gait import STIFFNESSES, GaitProblem, GaitWeights
 from pathwalker_cli.ocp.gait_bounds import GaitBounds, gait_bounds, tracking_bounds
 from pathwalker_cli.ocp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
+from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers
 from pathwalker_cli.ocp.series import GaitSeries, gait_series
@@ -35,7 +36,7 @@ from pathwalker_cli.patient import load_patient
 
 __all__ = ["GaitSolution", "GaitSolver", "StageRecord", "solve_study"]
 
-_TRACKING = GaitWeights(effort=0.0, rate=0.0, tracking=10.0, reserve=10.0, smoothing=1e-3)
+_TRACKING = GaitWeights(effort=0.0, rate=0.0, tracking=10.0, reserve=10.0, smoothing=0.1)
 """Weights of the first stage: follow the stride, carried by reserve forces where needed."""
 
 _FADED = 0.02
@@ -161,9 +162,7 @@ class GaitSolver:
         began = time.perf_counter()
         patient = load_patient(self.config.patient)
         model = self.config.model
-        self.walker = build_walker(
-            patient, self.config.condition, model.published, model.backend
-        )
+        self.walker = build_walker(patient, self.config.condition, model.published, model.backend)
         self.bounds = gait_bounds(self.walker, self.config.bounds)
         self.gait = GaitProblem(self.walker)
         self.blocks = CollocationBlocks(self.gait.build(), self.config.mesh.degree)
@@ -209,13 +208,15 @@ class GaitSolver:
         motion: PhasedMotion,
         numbers: ProblemNumbers,
         settings: IpoptSettings,
+        before: tuple[CollocationProgram, NlpResult] | None = None,
     ) -> tuple[CollocationProgram, NlpResult]:
-        """Solve one stage from a motion and record it."""
+        """Solve one stage from a motion, and from the multipliers of a stage before; record it."""
         began = time.perf_counter()
         program = CollocationProgram(self.blocks, numbers, motion.meshes)
+        multipliers = transferred(before[0], before[1].multipliers, program) if before else None
         observer = None if self.observer is None else self._named(name)
         start = program.to_unknowns(motion)
-        result = solve_program(program, start, settings, observer=observer)
+        result = solve_program(program, start, settings, multipliers, observer)
         record = StageRecord(
             name,
             result.status,
@@ -235,13 +236,16 @@ class GaitSolver:
         assert observer is not None
         return lambda report: observer(name, report)
 
-    def _settings(self, tolerance: float, barrier: float = 0.1) -> IpoptSettings:
+    def _settings(
+        self, tolerance: float, barrier: float = 0.1, warm: bool = False
+    ) -> IpoptSettings:
         solver = self.config.solver
         return IpoptSettings(
             tolerance=tolerance,
             constraint_tolerance=solver.constraint_tolerance,
             max_iterations=solver.max_iterations,
             initial_barrier=barrier,
+            warm_start=warm,
             extra=dict(solver.ipopt),
         )
 
@@ -267,7 +271,8 @@ class GaitSolver:
             motion = program.to_motion(result.unknowns)
         if mesh.intervals and not self._interrupted:
             motion = motion if warm_start is None else warm_start
-            program, result, errors = self._fine(motion, numbers)
+            before = (program, result) if warm_start is None else None
+            program, result, errors = self._fine(motion, numbers, before)
         else:
             errors = None
         return self._finish(program, result, errors, warm_start is not None)
@@ -289,19 +294,26 @@ class GaitSolver:
         return bool(self.stages) and self.stages[-1].status == "stopped by the user"
 
     def _fine(
-        self, motion: PhasedMotion, numbers: ProblemNumbers
+        self,
+        motion: PhasedMotion,
+        numbers: ProblemNumbers,
+        before: tuple[CollocationProgram, NlpResult] | None,
     ) -> tuple[CollocationProgram, NlpResult, Reintegration]:
         """Solve on the fine mesh and refine it until an independent integrator agrees."""
         mesh, solver = self.config.mesh, self.config.solver
         meshes = meshing.by_duration(
             motion.durations, mesh.intervals, mesh.least_intervals_per_phase
         )
-        settings = self._settings(solver.tolerance, solver.fine_initial_barrier)
+        settings = self._settings(
+            solver.tolerance, solver.fine_initial_barrier, warm=before is not None
+        )
         tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
         for attempt in range(mesh.refinements + 1):
             name = f"refined {attempt}" if attempt else "fine"
             start = motion.resampled(meshes, mesh.degree)
-            program, result = self.stage(name, start, numbers, settings)
+            program, result = self.stage(name, start, numbers, settings, before)
+            before = (program, result)
+            settings = self._settings(solver.tolerance, solver.refined_initial_barrier, warm=True)
             motion = program.to_motion(result.unknowns)
             began = time.perf_counter()
             errors = reintegrate(self.walker, motion)

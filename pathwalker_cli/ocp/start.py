@@ -30,7 +30,7 @@ _EVENTS = (
 """Events in the order of the phases; each begins the next pair of phases."""
 
 _SPLITS = (0.33, 0.5, 0.33, 0.5)
-"""Share of the first phase of each pair: recordings do not tell when a heel lifts or a toe lands."""
+"""Share of the first phase of each pair: recordings do not tell when heels lift or toes land."""
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,7 @@ def stylised_stride(
 ) -> ReferenceStride:
     """Return a stylised stride; at least 0.1 sqrt(g leg length) fast."""
     slowest = 0.1 * float(np.sqrt(GRAVITY * walker.leg_length))
-    gait = StylisedGait(
-        max(walking_speed, slowest), stride_ratio * walker.leg_length, knee_flexion
-    )
+    gait = StylisedGait(max(walking_speed, slowest), stride_ratio * walker.leg_length, knee_flexion)
     return ReferenceStride("synthetic", stylised_trajectory(walker, gait), gait.durations)
 
 
@@ -178,7 +176,9 @@ def recorded_stride(walker: Walker, recording: CompactRecording) -> ReferenceStr
     gaps = np.roll(np.diff(recording.motion.time[frames]), first)
     toe_off = float(gaps[first:].sum()) if first else 0.0
     closed = _turned(time - time[0], values, distance, period, toe_off)
-    durations = np.array([k for g, s in zip(gaps, _SPLITS, strict=True) for k in (g * s, g - g * s)])
+    durations = np.array(
+        [k for g, s in zip(gaps, _SPLITS, strict=True) for k in (g * s, g - g * s)]
+    )
     closed[:, 0] -= closed[0, 0]
     lowest = [walker.contact_points(q)[:, 1].min() for q in closed]
     closed[:, 1] -= np.mean(lowest)

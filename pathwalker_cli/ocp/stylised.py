@@ -8,7 +8,6 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from pathwalker_cli.conventions import COORDINATES, coordinate_unit
-from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.trajectory import Trajectory
 

@@ -26,8 +26,8 @@ __all__ = [
     "second_engine_residual",
 ]
 
-_NEAR = 1e-5
-"""Distance in solver units at which a bound counts as active."""
+_NEAR = 1e-2
+"""Distance in solver units beyond which a bound is never called active."""
 _PULL = 1e-5
 """Least multiplier of an active bound: without it the bound does not matter."""
 
@@ -86,7 +86,10 @@ class ActiveBound:
 def active_bounds(program: CollocationProgram, result: NlpResult) -> tuple[ActiveBound, ...]:
     """Return the inequality bounds that are active with a multiplier, grouped by name."""
     groups: dict[tuple[str, str, float], list[str]] = {}
+    costs = program.blocks.problem.integrals
     for name, where, side, value in _active_entries(program, result):
+        if name in costs:  # a running cost that stays zero holds nothing back
+            continue
         phases = groups.setdefault((name, side, round(value, 9)), [])
         phase = "" if where in ("all phases", "the whole motion") else where.split(" ")[0]
         if phase and phase not in phases:
@@ -104,7 +107,8 @@ def _active_entries(
         ("lower", lower, result.unknowns - lower, -result.multipliers.unknowns),
         ("upper", upper, upper - result.unknowns, result.multipliers.unknowns),
     ):
-        hit = (gap < _NEAR) & (pull > _PULL) & (upper > lower)
+        # along the barrier gap times multiplier is constant: active is where the multiplier wins
+        hit = (gap < np.minimum(_NEAR, pull)) & (pull > _PULL) & (upper > lower)
         for i in np.flatnonzero(hit):
             name, where = layout.names[i].split(" in ", 1)
             yield name, where, side, float(limit[i] * layout.scale[i])
@@ -112,7 +116,7 @@ def _active_entries(
         ("lower", nlp.lower, result.rows - nlp.lower, -result.multipliers.rows),
         ("upper", nlp.upper, nlp.upper - result.rows, result.multipliers.rows),
     ):
-        hit = (gap < _NEAR) & (pull > _PULL) & (nlp.upper > nlp.lower)
+        hit = (gap < np.minimum(_NEAR, pull)) & (pull > _PULL) & (nlp.upper > nlp.lower)
         for i in np.flatnonzero(hit):
             name, where = nlp.row_place(int(i))
             yield name, where, side, float(limit[i] * nlp.row_scale[i])

@@ -1,0 +1,108 @@
+"""The command line: finds commands, and turns errors into sentences and exit codes."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any, Final, NoReturn
+
+import click
+
+from pathwalker_cli import __version__
+from pathwalker_cli.errors import NotConvergedError, PathwalkerError
+
+__all__ = ["COMMANDS", "NOT_CONVERGED", "REFUSED", "STOPPED", "cli", "main"]
+
+NOT_CONVERGED: Final = 1
+"""Exit code of a solve that did not converge."""
+REFUSED: Final = 2
+"""Exit code of input that cannot be used, as of wrong usage."""
+STOPPED: Final = 130
+"""Exit code after Ctrl-C, by custom 128 + SIGINT."""
+
+COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
+    "solve": (
+        "pathwalker_cli.commands.solve",
+        "solve_command",
+        "Predict the gait of a patient by optimal control.",
+    ),
+    "model": (
+        "pathwalker_cli.commands.model",
+        "model_command",
+        "Write the walking model of a patient as a URDF.",
+    ),
+    "import": (
+        "pathwalker_cli.commands.recorded",
+        "import_command",
+        "Turn C3D files into joint angles, events and forces.",
+    ),
+    "ik": (
+        "pathwalker_cli.commands.recorded",
+        "ik_command",
+        "Compute joint angles from the markers of C3D files.",
+    ),
+    "id": (
+        "pathwalker_cli.commands.recorded",
+        "id_command",
+        "Compute joint torques and muscle strengths from recorded gait.",
+    ),
+    "doctor": (
+        "pathwalker_cli.commands.doctor",
+        "doctor_command",
+        "Check that everything PathWalker needs is there and works.",
+    ),
+}
+"""Module, attribute and first line of help of every command: listing them imports none."""
+
+
+class _LazyGroup(click.Group):
+    """Imports a command when it is called, and is the one place where errors become exit codes."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module, attribute, _ = COMMANDS[cmd_name]
+        command: click.Command = getattr(import_module(module), attribute)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            ctx.fail(f"there is no command '{args[0]}'; allowed: {', '.join(COMMANDS)}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, _, text) in COMMANDS.items()])
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except PathwalkerError as error:
+            code = NOT_CONVERGED if isinstance(error, NotConvergedError) else REFUSED
+            _fail(ctx, str(error), code)
+        except KeyboardInterrupt:
+            _fail(ctx, "stopped by the user before there was anything to keep", STOPPED)
+
+
+def _fail(ctx: click.Context, sentence: str, code: int) -> NoReturn:
+    """Say one sentence on stderr and exit."""
+    click.echo(f"Error: {sentence}", err=True)
+    ctx.exit(code)
+
+
+@click.group(
+    cls=_LazyGroup,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(__version__, prog_name="pathwalker")
+def cli() -> None:
+    """Predict how a child walks with and without ankle-foot orthoses, by optimal control."""
+
+
+def main() -> None:
+    """Run the command line; the entry point of `pathwalker`."""
+    cli.main(prog_name="pathwalker")

@@ -1,0 +1,76 @@
+"""The command `model`: a patient's walking model as a URDF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import click
+
+if TYPE_CHECKING:
+    from pathwalker_cli.conventions import Condition
+    from pathwalker_cli.model.anthropometry import Segment
+    from pathwalker_cli.patient import Patient
+
+__all__ = ["model_command"]
+
+
+@click.command("model")
+@click.argument("patient", metavar="PATIENT")
+@click.option(
+    "--condition",
+    required=True,
+    type=click.Choice(["barefoot", "orthosis"]),
+    help="What is worn: nothing, or shoes and orthoses.",
+)
+@click.option(
+    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="File; else stdout."
+)
+@click.option(
+    "--published", is_flag=True, help="Keep the published model's misplaced right forearm and hand."
+)
+def model_command(patient: str, condition: str, out: Path | None, published: bool) -> None:
+    """Write the walking model of PATIENT as a URDF, and its masses to stderr.
+
+    PATIENT is a shipped id, a folder with patient.yaml, or a YAML file.
+    """
+    from pathwalker_cli.model.anthropometry import segments
+    from pathwalker_cli.model.urdf import urdf_text
+    from pathwalker_cli.patient import load_patient
+
+    who, worn = load_patient(patient), cast("Condition", condition)
+    text = urdf_text(who, worn, published)
+    if out is None:
+        click.echo(text, nl=False)
+    else:
+        _write(out, text)
+    for line in _summary(who, worn, segments(who, worn, published)):
+        click.echo(line, err=True)
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file in one stroke."""
+    from pathwalker_cli.errors import DataError
+    from pathwalker_cli.io.atomic import atomic_open
+
+    if path.is_dir():
+        raise DataError("is a folder", where=str(path), mend="name a file in it")
+    try:
+        with atomic_open(path) as file:
+            file.write(text)
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise DataError(
+            f"cannot be written: {reason}", where=str(path), mend="choose another file"
+        ) from None
+
+
+def _summary(patient: Patient, condition: Condition, parts: tuple[Segment, ...]) -> list[str]:
+    """Return the masses and what was filled in."""
+    total = sum(part.mass for part in parts)
+    masses = ", ".join(f"{part.name} {part.mass:.3f}" for part in parts)
+    return [
+        f"{patient.id}, {condition}: {total:.3f} kg in all",
+        f"masses [kg]: {masses}",
+        *(f"note: {note}" for note in patient.notes),
+    ]

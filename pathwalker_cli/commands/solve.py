@@ -1,0 +1,143 @@
+"""The command `solve`: from a config to a run folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from pathwalker_cli.commands.progress import Progress
+    from pathwalker_cli.config import StudyConfig
+    from pathwalker_cli.ocp.solve import GaitSolution
+    from pathwalker_cli.output.run_folder import Run
+    from pathwalker_cli.output.run_metrics import RunInputs
+    from pathwalker_cli.patient import Patient
+
+__all__ = ["solve_command"]
+
+
+@click.command("solve")
+@click.argument("problem", metavar="PROBLEM")
+@click.argument("config", metavar="CONFIG")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Run folder; runs/PROBLEM-PATIENT if left out. An earlier run in it is replaced.",
+)
+@click.option(
+    "--warm-start",
+    type=click.Path(path_type=Path),
+    metavar="RUN",
+    help="Folder of a converged run of the same condition to begin with.",
+)
+@click.option("--smoke", is_flag=True, help="Coarse mesh without refinement, for a quick check.")
+@click.option(
+    "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Override a config value."
+)
+@click.option("--quiet", is_flag=True, help="Print errors only.")
+def solve_command(
+    problem: str,
+    config: str,
+    out: Path | None,
+    warm_start: Path | None,
+    smoke: bool,
+    changes: tuple[str, ...],
+    quiet: bool,
+) -> None:
+    """Solve PROBLEM (mapd-orthosis or mapd-barefoot) as CONFIG says and write a run folder.
+
+    CONFIG is a YAML file or the name of a shipped one. Ctrl-C stops after the current iteration
+    and keeps the last iterate. Exit codes: 0 converged, 1 not converged, 2 bad input.
+    """
+    from pathwalker_cli.commands.progress import Progress
+    from pathwalker_cli.errors import NotConvergedError
+    from pathwalker_cli.output.run_folder import (
+        check_target,
+        config_text,
+        warm_start_run,
+        write_run,
+    )
+    from pathwalker_cli.output.run_metrics import run_inputs
+    from pathwalker_cli.output.solve_text import failure_text
+
+    study, patient = _study(problem, config, changes, smoke)
+    folder = out or Path("runs") / f"{problem}-{patient.id}"
+    check_target(folder)
+    earlier = None if warm_start is None else warm_start_run(warm_start, study)
+    inputs = run_inputs(config_text(study), patient, warm_start)
+    with Progress(quiet) as progress:
+        solution = _solve(study, earlier, progress)
+    metrics = write_run(folder, solution, _log(solution, inputs, progress), inputs)
+    if not quiet:
+        _report(solution, metrics, folder)
+    if not solution.converged:
+        raise NotConvergedError(failure_text(solution, str(folder)))
+
+
+def _study(
+    problem: str, path: str, changes: tuple[str, ...], smoke: bool
+) -> tuple[StudyConfig, Patient]:
+    """Return the config with all overrides, and its patient."""
+    from pathwalker_cli.config import condition_of, load_config, smoke_version
+    from pathwalker_cli.errors import PatientError
+    from pathwalker_cli.patient import load_patient
+
+    condition_of(problem)
+    study = load_config(path, problem, changes)
+    try:
+        patient = load_patient(study.patient)
+    except PatientError as error:
+        if error.where:
+            raise
+        where = f"{path}, patient"
+        raise PatientError(
+            error.what, where=where, allowed=error.allowed, mend=error.mend
+        ) from None
+    return smoke_version(study) if smoke else study, patient
+
+
+def _solve(study: StudyConfig, earlier: Run | None, progress: Progress) -> GaitSolution:
+    """Solve a study, from an earlier run if there is one."""
+    from pathwalker_cli.ocp.solve import GaitSolver
+
+    return GaitSolver(study, progress).solve(None if earlier is None else earlier.motion)
+
+
+def _log(solution: GaitSolution, inputs: RunInputs, progress: Progress) -> list[str]:
+    """Return the lines of `log.txt`: every iteration, then every stage."""
+    lines = [f"{solution.config.problem}, patient {solution.walker.patient.id}"]
+    lines += [f"{name} sha256 {value}" for name, value in inputs.hashes.items()]
+    lines += progress.lines
+    for stage in solution.stages:
+        lines.append(
+            f"stage {stage.name}: {stage.status}; {stage.intervals} intervals, "
+            f"{stage.unknowns} unknowns, {stage.iterations} iterations, {stage.seconds:.2f} s, "
+            f"of which {stage.seconds_functions:.2f} s in functions"
+        )
+    return [*lines, f"status: {solution.status}"]
+
+
+def _report(solution: GaitSolution, metrics: dict[str, Any], folder: Path) -> None:
+    """Print the summary of a run."""
+    from rich.console import Console
+
+    from pathwalker_cli.output.run_metrics import stiffness_ranges
+    from pathwalker_cli.output.solve_text import detail_lines, source_lines
+    from pathwalker_cli.output.text import active_bounds, summary, summary_renderable
+
+    bounds = active_bounds(metrics, stiffness_ranges(solution)) if solution.converged else ()
+    console = Console()
+    if console.is_terminal:
+        console.print(summary_renderable(metrics, solution.status, solution.cost, bounds))
+    else:
+        click.echo(summary(metrics, solution.status, solution.cost, bounds))
+    click.echo()
+    rows = detail_lines(solution, metrics)
+    rows += [("bounds", line) for line in source_lines(solution.bounds.sources)]
+    rows += [("patient", note) for note in solution.walker.patient.notes]
+    for label, text in rows:
+        click.echo(f"{label:<22}{text}")
+    click.echo(f"\nWritten to {folder}")

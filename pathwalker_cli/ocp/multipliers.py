@@ -1,0 +1,98 @@
+"""Carry multipliers from one mesh to another, so that a refined problem starts warm.
+
+A multiplier belongs to an instant and grows with the quadrature weight of its row; divided by that
+weight it samples a continuous function of time, which is interpolated on the new mesh.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.ipopt import Multipliers
+from pathwalker_cli.ocp.phased import quadrature_weights
+
+__all__ = ["transferred"]
+
+
+def transferred(
+    old: CollocationProgram, multipliers: Multipliers, new: CollocationProgram
+) -> Multipliers:
+    """Return multipliers on the mesh of another program of the same problem and degree.
+
+    Args:
+        old: The program that was solved.
+        multipliers: Its multipliers.
+        new: The program to be solved.
+    """
+    return Multipliers(
+        _of_unknowns(old, multipliers.unknowns, new), _of_rows(old, multipliers.rows, new)
+    )
+
+
+def _of_rows(old: CollocationProgram, values: np.ndarray, new: CollocationProgram) -> np.ndarray:
+    """Return multipliers of the rows, block by block."""
+    parts, offset = [], 0
+    for before, after in zip(old.program.occurrences, new.program.occurrences, strict=True):
+        size = before.block.rows * before.count
+        block = values[offset : offset + size].reshape(before.block.rows, before.count, order="F")
+        offset += size
+        result = np.zeros((after.block.rows, after.count))
+        for series in set(before.series):
+            rows = [k for k, name in enumerate(before.series) if name == series]
+            result[rows] = _resample(
+                before.times[rows], block[rows], before.weights[rows],
+                after.times[rows], after.weights[rows],
+            )  # fmt: skip
+        parts.append(result.ravel(order="F"))
+    return np.concatenate(parts)
+
+
+def _resample(
+    times: np.ndarray,
+    values: np.ndarray,
+    weights: np.ndarray,
+    new_times: np.ndarray,
+    new_weights: np.ndarray,
+) -> np.ndarray:
+    """Return weighted samples of the function that other weighted samples stand for."""
+    order = np.argsort(times, axis=None)
+    density = (values / weights).ravel()[order]
+    return np.asarray(np.interp(new_times, times.ravel()[order], density) * new_weights)
+
+
+def _of_unknowns(
+    old: CollocationProgram, values: np.ndarray, new: CollocationProgram
+) -> np.ndarray:
+    """Return multipliers of the bounds on the unknowns, phase by phase."""
+    before, after = old.layout, new.layout
+    result = np.zeros(after.size)
+    result[after.durations] = values[before.durations]
+    result[after.parameters] = values[before.parameters]
+    degree = new.blocks.degree
+    for i, (p, q) in enumerate(zip(before.phases, after.phases, strict=True)):
+        old_nodes, old_points = _weights(old.meshes[i], degree)
+        new_nodes, new_points = _weights(new.meshes[i], degree)
+        for name in ("smooth", "controls"):
+            a, b = getattr(before, name)[p.nodes], getattr(after, name)[q.nodes]
+            for column in range(a.shape[1]):
+                result[b[:, column]] = _resample(
+                    *(old_nodes[0], values[a[:, column]], old_nodes[1]), *new_nodes
+                )
+        for name in ("inner_states", "algebraic"):
+            a, b = getattr(p, name), getattr(q, name)
+            for column in range(a.shape[2]):
+                result[b[:, :, column]] = _resample(
+                    *(old_points[0], values[a[:, :, column]], old_points[1]), *new_points
+                )
+    return result
+
+
+def _weights(
+    mesh: np.ndarray, degree: int
+) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """Return (times, weights) of the nodes and of the collocation points of a phase."""
+    steps = np.diff(mesh)
+    around = np.concatenate([[steps[0]], (steps[:-1] + steps[1:]), [steps[-1]]]) / 2
+    times, weights = quadrature_weights(degree)
+    return (mesh, around), (mesh[:-1, None] + steps[:, None] * times, steps[:, None] * weights)

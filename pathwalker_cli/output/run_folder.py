@@ -1,0 +1,275 @@
+"""The folder of a run: written in one stroke, read back with suspicion."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import yaml
+
+from pathwalker_cli.config import StudyConfig, load_config
+from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.ocp.gait import STIFFNESSES
+from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.ocp.series import GaitSeries
+from pathwalker_cli.ocp.solve import GaitSolution
+from pathwalker_cli.output.figures import save_figures
+from pathwalker_cli.output.motion_file import read_motion, write_motion
+from pathwalker_cli.output.recorded_reference import recorded_reference
+from pathwalker_cli.output.run_metrics import (
+    RUN_FORMAT,
+    RunInputs,
+    run_inputs,
+    run_metrics,
+    sha256,
+)
+from pathwalker_cli.output.tables import TABLES
+
+__all__ = [
+    "ENTRIES",
+    "Run",
+    "check_target",
+    "config_text",
+    "load_run",
+    "warm_start_run",
+    "write_run",
+]
+
+_CONFIG, _METRICS, _MOTION = "config.resolved.yaml", "metrics.json", "motion.npz"
+_SEAL: Final = "NOT_CONVERGED.txt"
+
+ENTRIES: Final = frozenset({_CONFIG, _METRICS, _MOTION, _SEAL, "log.txt", "figures", *TABLES})
+"""Everything that a run folder holds; a folder with anything else is never replaced."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run as it was read back.
+
+    Args:
+        folder: Where it stands.
+        metrics: Content of `metrics.json`.
+        motion: The exact motion.
+        config: The config with all defaults filled in.
+    """
+
+    folder: Path
+    metrics: dict[str, Any]
+    motion: PhasedMotion
+    config: StudyConfig
+
+
+def config_text(config: StudyConfig) -> str:
+    """Return a config with all defaults filled in, as YAML that `load_config` reads."""
+    content = yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+    return f"# The config of this run, every value written out.\n{content}"
+
+
+def write_run(
+    folder: str | Path,
+    solution: GaitSolution,
+    log: Sequence[str] = (),
+    inputs: RunInputs | None = None,
+) -> dict[str, Any]:
+    """Write a run, converged or not, and return its metrics.
+
+    The folder is there in full at the end or, after an error, as it was before.
+
+    Args:
+        folder: The folder; an earlier run in it is replaced.
+        solution: How the solve ended.
+        log: Lines of `log.txt`.
+        inputs: What the run was made from; taken now if left out.
+
+    Raises:
+        DataError: If the folder holds something else, or cannot be written.
+    """
+    text = config_text(solution.config)
+    metrics = run_metrics(solution, inputs or run_inputs(text, solution.walker.patient))
+    with _staged(Path(folder)) as staging:
+        (staging / _CONFIG).write_text(text, encoding="utf-8")
+        (staging / "log.txt").write_text("".join(f"{line}\n" for line in log), encoding="utf-8")
+        write_motion(staging / _MOTION, solution.last_motion)
+        metrics["motion_hash"] = sha256((staging / _MOTION).read_bytes())
+        _write_series(staging, solution.last_iterate)
+        if not solution.converged:
+            (staging / _SEAL).write_text(_seal(solution), encoding="utf-8")
+        shown = json.dumps(metrics, indent=2, ensure_ascii=False, allow_nan=False)
+        (staging / _METRICS).write_text(shown + "\n", encoding="utf-8")
+    return metrics
+
+
+def _write_series(folder: Path, series: GaitSeries) -> None:
+    """Write tables and figures; no figures of a last iterate that holds no numbers."""
+    for name, write in TABLES.items():
+        write(folder / name, series)
+    if all(np.isfinite(values).all() for values in (series.q, series.force, series.net_torque)):
+        reference = recorded_reference(series.walker.patient, series.walker.condition)
+        save_figures(series, folder / "figures", reference)
+
+
+def _seal(solution: GaitSolution) -> str:
+    """Return what `NOT_CONVERGED.txt` says."""
+    lines = [
+        f"{solution.config.problem} did not converge: {solution.status}.",
+        "The files beside this one show the last iterate, which is no solution: do not use it.",
+        "Largest violations, each in its own unit:",
+        *(f"  {violation.amount:.3g}  {violation.name}" for violation in solution.violations),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def check_target(folder: str | Path) -> Path:
+    """Return the real path of an output folder.
+
+    Raises:
+        DataError: If something stands there that is no run, or it cannot be written.
+    """
+    target, mend = Path(os.path.realpath(folder)), "choose another --out"
+    here = Path.cwd()
+    if target == here or target in here.parents:
+        raise DataError("is the current folder or one above it", where=str(folder), mend=mend)
+    above = next(path for path in (target, *target.parents) if path.exists())
+    if not above.is_dir():
+        raise DataError("is a file, not a folder", where=str(above), mend=mend)
+    for place in {above, target.parent} if target.exists() else {above}:
+        if not os.access(place, os.W_OK | os.X_OK):
+            raise DataError("cannot be written", where=str(place), mend=mend)
+    names = {path.name for path in target.iterdir()} if target.exists() else set()
+    foreign = sorted(names - ENTRIES) if _METRICS in names else sorted(names)
+    if foreign:
+        what = f"is not empty and no run folder: it holds {foreign[0]}"
+        raise DataError(
+            what, where=str(folder), allowed="a new folder or an earlier run", mend=mend
+        )
+    return target
+
+
+@contextmanager
+def _staged(folder: Path) -> Iterator[Path]:
+    """Yield an empty folder that takes the place of `folder` when the block ends without error."""
+    target = check_target(folder)
+    beside = next(path for path in target.parents if path.exists())
+    staging = None
+    try:
+        staging = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".tmp", dir=beside))
+        fresh = staging / "new"
+        fresh.mkdir()
+        yield fresh
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _exchange(fresh, check_target(folder), staging / "old")
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise DataError(f"cannot be written: {reason}", where=str(folder)) from None
+    finally:
+        if staging is not None:
+            shutil.rmtree(staging, ignore_errors=True)
+
+
+def _exchange(fresh: Path, target: Path, old: Path) -> None:
+    """Move a folder to its place; an older one comes back if that fails."""
+    if target.exists():
+        target.rename(old)
+    try:
+        fresh.rename(target)
+    except BaseException:
+        if old.exists():
+            old.rename(target)
+        raise
+
+
+def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
+    """Read a run.
+
+    Args:
+        folder: The folder of the run.
+        allow_unconverged: Whether the last iterate of a failed solve is wanted, knowingly.
+
+    Raises:
+        DataError: If the folder is no run, or a file of it is missing, truncated or foreign.
+        NotConvergedError: If the run did not converge.
+    """
+    folder = Path(folder)
+    metrics = _read_metrics(folder)
+    if (metrics["status"] != "converged" or (folder / _SEAL).exists()) and not allow_unconverged:
+        raise NotConvergedError(
+            f"{folder}: {metrics['problem']} did not converge there ({metrics['status']}); "
+            "its last iterate is no solution"
+        )
+    path = folder / _MOTION
+    motion = read_motion(path)
+    if sha256(path.read_bytes()) != metrics["motion_hash"]:
+        raise DataError("does not belong to metrics.json beside it", where=str(path),
+                        mend="solve again")  # fmt: skip
+    config = load_config(_file(folder, _CONFIG))
+    expected = len(STIFFNESSES) if config.condition == "orthosis" else 0
+    if config.problem != metrics["problem"] or motion.parameters.size != expected:
+        where = str(folder / _CONFIG)
+        raise DataError("does not belong to metrics.json beside it", where=where)
+    return Run(folder, metrics, motion, config)
+
+
+def _file(folder: Path, name: str) -> Path:
+    """Return a file of a run that must be there."""
+    path = folder / name
+    if not folder.is_dir():
+        raise DataError("no such folder", where=str(folder), allowed="the folder of a run")
+    if not path.is_file():
+        raise DataError(f"is no run folder: {name} is missing", where=str(folder),
+                        allowed="a folder that `pathwalker solve` wrote")  # fmt: skip
+    return path
+
+
+def _read_metrics(folder: Path) -> dict[str, Any]:
+    """Return the metrics of a run."""
+    path = _file(folder, _METRICS)
+    try:
+        metrics = json.loads(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise DataError("is not text in UTF-8", where=str(path), mend="solve again") from None
+    except json.JSONDecodeError as problem:
+        where = f"{path}, line {problem.lineno}"
+        raise DataError("is not valid JSON", where=where, mend="solve again") from None
+    keys = ("run_format", "problem", "status", "condition", "motion_hash")
+    missing = [key for key in keys if not isinstance(metrics, dict) or key not in metrics]
+    if missing:
+        raise DataError(f"lacks the key {missing[0]}", where=str(path),
+                        allowed="metrics that `pathwalker solve` wrote")  # fmt: skip
+    if metrics["run_format"] != RUN_FORMAT:
+        raise DataError(f"has run_format {metrics['run_format']}", where=str(path),
+                        allowed=str(RUN_FORMAT), mend="solve again")  # fmt: skip
+    return dict(metrics)
+
+
+def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
+    """Return the run that a solve shall begin with.
+
+    Args:
+        folder: Its folder.
+        config: What is to be solved.
+
+    Raises:
+        DataError: If it cannot be used, did not converge or is about another condition.
+    """
+    try:
+        run = load_run(folder)
+    except NotConvergedError as error:
+        raise DataError(
+            str(error), where="--warm-start", allowed="a converged run", mend="solve it again first"
+        ) from None
+    if run.config.condition != config.condition:
+        raise DataError(
+            f"is a run of {run.config.problem} ({run.config.condition}), whose free parameters "
+            f"are not those of {config.problem} ({config.condition})",
+            where=f"--warm-start {folder}",
+            allowed=f"a run of the {config.condition} condition",
+        )
+    return run

@@ -1,0 +1,130 @@
+"""What a solve says at its end: proof, active bounds, times, and where the bounds come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from pathwalker_cli.conventions import COORDINATES, to_degrees
+from pathwalker_cli.ocp.gait import STIFFNESSES
+from pathwalker_cli.ocp.solve import GaitSolution
+from pathwalker_cli.ocp.verify import ActiveBound
+
+__all__ = ["bound_lines", "detail_lines", "failure_text", "interesting", "source_lines"]
+
+_ANGLES: Final = frozenset(COORDINATES[2:])
+_UNITS: Final = {"duration": "s", "walking_speed": "m/s", "distance": "m"}
+
+_MET: Final = 1e-6
+"""Violation up to which a constraint counts as met, each in its own unit."""
+
+
+def interesting(bound: ActiveBound) -> bool:
+    """Return whether a bound is a choice that shapes the gait: joint range, duration, speed."""
+    return bound.name in _ANGLES or bound.name in _UNITS or bound.name in STIFFNESSES
+
+
+def bound_lines(solution: GaitSolution) -> list[str]:
+    """Return one line per active bound of interest; stiffnesses have their own note.
+
+    The bounds of a solve that did not converge hold nothing back yet.
+    """
+    if not solution.converged:
+        return []
+    return [
+        _bound_line(bound)
+        for bound in solution.active
+        if interesting(bound) and bound.name not in STIFFNESSES
+    ]
+
+
+def _bound_line(bound: ActiveBound) -> str:
+    where = f" in {', '.join(bound.places)}" if bound.places else ""
+    if bound.name in _ANGLES:
+        amount = f"{bound.value:.3f} rad ({to_degrees(bound.value):.1f} deg)"
+    else:
+        amount = f"{bound.value:.4g} {_UNITS[bound.name]}"
+    name = {"walking_speed": "walking speed", "duration": "phase duration"}.get(
+        bound.name, bound.name
+    )
+    return f"{name} at its {bound.side} bound {amount}{where}"
+
+
+def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return label and text of proof, active bounds, stages and times.
+
+    Args:
+        solution: How the solve ended.
+        metrics: Its metrics as they were written.
+    """
+    worst = solution.violations[0]
+    errors = solution.reintegration
+    again = (
+        "not run on this mesh"
+        if errors is None
+        else f"{errors.worst_position:.1e} rad or m, {errors.worst_velocity:.1e} rad/s or m/s"
+    )
+    stages = (f"{s.name} {s.iterations} in {s.seconds:.1f} s" for s in solution.stages)
+    seconds = (f"{part} {metrics[f'seconds_{part}']:.1f}" for part in ("build", "solve", "verify"))
+    rows = [
+        ("largest violation", f"{worst.amount:.1e} ({worst.name})"),
+        ("re-integration error", again),
+        ("second engine", f"equations of motion met within {solution.second_engine:.1e} N or N m"),
+        ("iterations", f"{', '.join(stages)}; {solution.last_motion.intervals} intervals at last"),
+        ("seconds", ", ".join(seconds)),
+        ("dynamics, start", f"{solution.walker.backend}, {solution.start}"),
+    ]
+    return [*rows, *(("active bound", line) for line in bound_lines(solution))]
+
+
+def source_lines(sources: Mapping[str, str]) -> list[str]:
+    """Return where the bounds come from, in short: equal reasons are said once.
+
+    Args:
+        sources: `GaitBounds.sources`.
+    """
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name, text in sources.items():
+        if name in _ANGLES:
+            key = ("joint ranges", text.partition("] rad, ")[2] or text)
+        elif name.startswith("duration"):
+            key = ("phase durations", text)
+        elif name in STIFFNESSES:
+            key = ("stiffness", text.partition(": ")[0])
+        else:
+            key = (name.replace("_", " "), text)
+        groups.setdefault(key, []).append(name.removeprefix("duration of "))
+    kinds = [kind for kind, _ in groups]
+    lines = []
+    for (kind, reason), names in groups.items():
+        several = kinds.count(kind) > 1
+        lines.append(f"{kind} of {', '.join(names)}: {reason}" if several else f"{kind}: {reason}")
+    return lines
+
+
+def failure_text(solution: GaitSolution, folder: str) -> str:
+    """Return one sentence about a solve that did not converge.
+
+    Args:
+        solution: How it ended.
+        folder: Where its files are.
+    """
+    worst = [v for v in solution.violations if not v.amount <= _MET][:3]
+    if worst:
+        named = ", ".join(f"{v.name} by {v.amount:.2g}" for v in worst)
+        detail = f"the worst violations are {named}"
+    else:
+        largest = np.max([v.amount for v in solution.violations])
+        detail = f"all constraints are met within {largest:.1e}"
+    errors = solution.reintegration
+    if errors is not None:
+        detail += (
+            f", and an independent integrator misses the next node by "
+            f"{errors.worst_position:.1e} (rad, m) and {errors.worst_velocity:.1e} (rad/s, m/s)"
+        )
+    return (
+        f"{solution.config.problem} did not converge: {solution.status}; {detail}; "
+        f"the last iterate is in {folder}, marked as not converged"
+    )

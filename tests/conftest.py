@@ -1,0 +1,70 @@
+"""What all tests share: figures without a screen, no network, and a run without a solve."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+os.environ["MPLBACKEND"] = "Agg"
+
+import numpy as np
+import pytest
+
+from helpers import stylised_series, walker_of
+from pathwalker_cli.config import PROBLEMS, load_config
+from pathwalker_cli.ocp.gait_bounds import gait_bounds
+from pathwalker_cli.ocp.solve import GaitSolution, StageRecord
+from pathwalker_cli.ocp.verify import ActiveBound, Reintegration, Violation
+
+MadeSolution = Callable[..., GaitSolution]
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _no_network() -> Iterator[None]:
+    """Refuse connections: nothing here needs any."""
+    connect = socket.socket.connect
+
+    def refuse(self: socket.socket, address: Any) -> None:
+        if self.family != socket.AF_UNIX:
+            raise OSError(f"tests must not connect to {address}")
+        connect(self, address)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(socket.socket, "connect", refuse)
+        yield
+
+
+@pytest.fixture(scope="session")
+def made_solution() -> MadeSolution:
+    """Return a function that makes the end of a solve out of the stylised gait."""
+
+    def make(problem: str = "mapd-orthosis", **changes: Any) -> GaitSolution:
+        config = load_config(problem)
+        walker = walker_of(PROBLEMS[problem])
+        errors = (np.array([2e-4, 5e-4]), np.array([3e-4]))
+        solution = GaitSolution(
+            config=config,
+            walker=walker,
+            status="converged",
+            last_motion=(stylised_series(PROBLEMS[problem]).motion),
+            nlp=None,  # type: ignore[arg-type]
+            bounds=gait_bounds(walker, config.bounds),
+            cost=0.4,
+            cost_terms={"effort_per_distance": 0.4},
+            violations=(Violation("knee_r rate in right_toe at 50 % of the phase", 2e-9),),
+            active=(
+                ActiveBound("knee_l", "lower", 0.264, ("left_toe",)),
+                ActiveBound("walking_speed", "lower", 0.636, ()),
+                ActiveBound("hip_extension_r_activation", "lower", 0.0, ("right_toe",)),
+            ),
+            reintegration=Reintegration(errors, errors),
+            start="synthetic",
+            stages=(StageRecord("fine", "converged", 32, 5000, 42, 1.5, 0.5),),
+            seconds={"build": 1.0, "solve": 1.5, "verify": 0.2},
+        )
+        return replace(solution, **changes)
+
+    return make

@@ -1,0 +1,149 @@
+"""Dependencies point one way, and heavy libraries stay where they belong."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import pathwalker_cli
+
+PACKAGE = Path(pathwalker_cli.__file__).parent
+ROOT = "pathwalker_cli"
+
+LAYERS = (
+    {"conventions", "errors", "paths"},
+    {"trajectory"},
+    {"io"},
+    {"patient_blocks", "model.proportions"},
+    {"patient"},
+    {"io.recordings"},
+    {"model"},
+    {"config"},
+    {"ocp", "inverse"},
+    {"output"},
+    {"commands"},
+    {"cli"},
+)
+"""Later ones may import earlier ones. `io.recordings` knows patients, who know `io`."""
+
+APART = ({"ocp", "inverse"},)
+"""Members of one layer that must not know each other."""
+
+CONFINED = {
+    "casadi": ("model", "ocp", "commands.doctor"),
+    "pinocchio": ("model", "ocp", "inverse", "output.figures.stick_figures"),
+    "matplotlib": ("output.figures", "output.recorded_figures"),
+    "click": ("cli", "commands"),
+    "rich": ("commands", "output"),
+    "ezc3d": ("io",),
+    "yaml": ("io", "config", "output.run_folder"),
+}
+"""Libraries and the parts of the package that may import them."""
+
+
+def modules() -> dict[str, Path]:
+    """Return every module by its name below the package."""
+    found = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        name = ".".join(part for part in parts if part != "__init__")
+        if name:
+            found[name] = path
+    return found
+
+
+@cache
+def imports(name: str) -> frozenset[str]:
+    """Return the full names of all that a module imports, inside functions too."""
+    tree = ast.parse(modules()[name].read_text(encoding="utf-8"))
+    return frozenset(_imported(tree))
+
+
+def _imported(node: ast.AST) -> Iterator[str]:
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+            continue
+        if isinstance(child, ast.Import):
+            yield from (alias.name for alias in child.names)
+        elif isinstance(child, ast.ImportFrom):
+            assert child.level == 0, "imports are absolute"
+            yield from (f"{child.module}.{alias.name}" for alias in child.names)
+        yield from _imported(child)
+
+
+def own_imports(name: str) -> set[str]:
+    """Return the modules of the package that a module imports."""
+    known, found = modules(), set()
+    for full in imports(name):
+        part = full.removeprefix(f"{ROOT}.")
+        while part != full and part and part not in known:
+            part = part.rpartition(".")[0]
+        if part and part != full:
+            found.add(part)
+    return found - {name}
+
+
+def covers(part: str, module: str) -> bool:
+    """Return whether a module is this part of the package or in it."""
+    return module == part or module.startswith(f"{part}.")
+
+
+def home(module: str) -> tuple[int, str]:
+    """Return layer and part of a module; the longest name counts."""
+    found = [(len(part), i, part) for i, layer in enumerate(LAYERS) for part in layer
+             if covers(part, module)]  # fmt: skip
+    assert found, f"{module} belongs to no layer: add it to LAYERS"
+    _, layer, part = max(found)
+    return layer, part
+
+
+def test_the_package_is_found() -> None:
+    assert {"cli", "config", "ocp.solve", "commands.solve"} <= modules().keys()
+    assert "ocp.solve" in own_imports("commands.solve"), "imports inside functions count"
+
+
+@pytest.mark.parametrize("name", modules())
+def test_no_module_imports_from_a_later_layer(name: str) -> None:
+    layer, part = home(name)
+    for other in own_imports(name):
+        theirs, their_part = home(other)
+        assert theirs <= layer, f"{name} imports {other}, which is further out"
+        for group in APART:
+            together = {part, their_part} <= group and part != their_part
+            assert not together, f"{name} imports {other}"
+
+
+def test_no_module_imports_itself_in_a_circle() -> None:
+    done: set[str] = set()
+
+    def visit(name: str, path: tuple[str, ...]) -> None:
+        assert name not in path, " -> ".join([*path[path.index(name) :], name])
+        if name not in done:
+            for other in sorted(own_imports(name)):
+                if not covers(other, name):  # a package that re-exports from inside it
+                    visit(other, (*path, name))
+            done.add(name)
+
+    for name in modules():
+        visit(name, ())
+
+
+@pytest.mark.parametrize("name", modules())
+def test_heavy_libraries_stay_in_their_parts(name: str) -> None:
+    for full in imports(name):
+        library = full.partition(".")[0]
+        allowed = CONFINED.get(library)
+        if allowed is not None:
+            assert any(covers(part, name) for part in allowed), f"{name} imports {library}"
+
+
+def test_every_entry_names_something_that_exists() -> None:
+    parts = {part for layer in LAYERS for part in layer}
+    parts |= {part for allowed in CONFINED.values() for part in allowed}
+    assert sum(map(len, LAYERS)) == len(set().union(*LAYERS)), "a part stands in two layers"
+    for part in parts:
+        assert any(covers(part, name) for name in modules()), part
