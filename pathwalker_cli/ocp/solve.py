@@ -85,7 +85,7 @@ class GaitSolution:
         cost_terms: Its terms by name; they add up to the cost.
         violations: Largest violations, largest first.
         active: Active bounds.
-        reintegration: Errors of an independent integrator; None if it was not run.
+        reintegration: Errors of an independent integrator.
         start: Where the search began.
         stages: The stages.
         seconds: Wall seconds by part: build, solve, verify.
@@ -101,7 +101,7 @@ class GaitSolution:
     cost_terms: dict[str, float]
     violations: tuple[Violation, ...]
     active: tuple[ActiveBound, ...]
-    reintegration: Reintegration | None
+    reintegration: Reintegration
     start: str
     stages: tuple[StageRecord, ...]
     seconds: dict[str, float]
@@ -165,6 +165,8 @@ class GaitSolver:
         self.walker = build_walker(patient, self.config.condition, model.published, model.backend)
         self.bounds = gait_bounds(self.walker, self.config.bounds)
         self.gait = GaitProblem(self.walker)
+        if self.config.start.gait == "recorded":
+            _ = self.stride  # a missing recording is refused before anything is built
         self.blocks = CollocationBlocks(self.gait.build(), self.config.mesh.degree)
         self.seconds["build"] += time.perf_counter() - began
 
@@ -274,7 +276,7 @@ class GaitSolver:
             before = (program, result) if warm_start is None else None
             program, result, errors = self._fine(motion, numbers, before)
         else:
-            errors = None
+            errors = self._reintegrated(program.to_motion(result.unknowns))
         return self._finish(program, result, errors, warm_start is not None)
 
     def _track(self, coarse: tuple[np.ndarray, ...]) -> tuple[CollocationProgram, NlpResult]:
@@ -315,25 +317,29 @@ class GaitSolver:
             before = (program, result)
             settings = self._settings(solver.tolerance, solver.refined_initial_barrier, warm=True)
             motion = program.to_motion(result.unknowns)
-            began = time.perf_counter()
-            errors = reintegrate(self.walker, motion)
-            self.seconds["verify"] += time.perf_counter() - began
+            errors = self._reintegrated(motion)
             if not result.converged or _within(errors, tolerances) or self._interrupted:
                 break
             meshes = meshing.refined(meshes, errors, *tolerances, order=mesh.degree)
         return program, result, errors
 
+    def _reintegrated(self, motion: PhasedMotion) -> Reintegration:
+        began = time.perf_counter()
+        errors = reintegrate(self.walker, motion)
+        self.seconds["verify"] += time.perf_counter() - began
+        return errors
+
     def _finish(
         self,
         program: CollocationProgram,
         result: NlpResult,
-        errors: Reintegration | None,
+        errors: Reintegration,
         warm: bool,
     ) -> GaitSolution:
         mesh = self.config.mesh
         status = result.status
         tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
-        if result.converged and errors is not None and not _within(errors, tolerances):
+        if result.converged and mesh.intervals and not _within(errors, tolerances):
             status = "the mesh does not reach the accuracy asked for"
         motion = program.to_motion(result.unknowns)
         return GaitSolution(

@@ -1,0 +1,188 @@
+"""The gait problem: structure, derivatives, starts, bounds and whole solves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from pathwalker_cli.config import BoundsConfig, StudyConfig, load_config
+from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.io.recordings import read_recording
+from pathwalker_cli.model.contact import PHASES
+from pathwalker_cli.ocp import mesh as meshing
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.gait_bounds import gait_bounds
+from pathwalker_cli.ocp.multipliers import transferred
+from pathwalker_cli.ocp.series import actuator_torques
+from pathwalker_cli.ocp.solve import GaitSolver, solve_study
+from pathwalker_cli.ocp.start import recorded_stride
+
+CHILD = str(Path(__file__).parent / "data" / "child-10y" / "patient.yaml")
+
+
+def _config(**changes: object) -> StudyConfig:
+    return load_config("mapd-orthosis").model_copy(update=changes)
+
+
+@pytest.fixture(scope="module")
+def solver() -> GaitSolver:
+    return GaitSolver(_config())
+
+
+@pytest.fixture(scope="module")
+def program(solver: GaitSolver) -> CollocationProgram:
+    motion = solver.stride.motion(
+        solver.walker, solver.stiffness_guess(), meshing.uniform([2] * 8), 3
+    )
+    numbers = solver.numbers(solver.weights, solver.bounds.table)
+    return CollocationProgram(solver.blocks, numbers, motion.meshes)
+
+
+def test_phases_touch_down_and_lift_off_once() -> None:
+    following = PHASES[1:] + PHASES[:1]
+    pairs = list(zip(PHASES, following, strict=True))
+    down = [force for a, b in pairs for force in a.touched_down(b)]
+    up = [force for a, b in pairs for force in a.lifted_off(b)]
+    assert sorted(down) == ["heel_l_x", "heel_l_z", "heel_r_x", "heel_r_z", "toe_l_z", "toe_r_z"]
+    assert sorted(up) == ["heel_l_z", "heel_r_z", "toe_l_x", "toe_l_z", "toe_r_x", "toe_r_z"]
+
+
+def test_frozen_curves_give_the_torques_and_their_derivatives(solver: GaitSolver) -> None:
+    """Residuals of the blocks against plain expressions, by value and by finite difference."""
+    block = solver.blocks.phases[4].residual
+    rng = np.random.default_rng(5)
+    x = 0.3 * rng.normal(size=block.unknowns.numel())
+    data = np.concatenate([[0.1, 0.5], np.zeros(10)])
+    shared = solver.numbers(solver.weights, solver.bounds.table).shared
+    jacobian = np.asarray(ca.DM(block.jacobian(x, data, shared)[0]))
+    lam = rng.normal(size=block.rows)
+    hessian = np.asarray(ca.DM(block.hessian(x, data, shared, 0.0, lam)))
+    hessian = hessian + np.triu(hessian, 1).T
+    h = 1e-6
+    for k in rng.choice(x.size, 25, replace=False):
+        e = h * (np.arange(x.size) == k)
+        values = [np.asarray(block.values(x + s * e, data, shared)[0]).ravel() for s in (1, -1)]
+        assert (values[0] - values[1]) / (2 * h) == pytest.approx(jacobian[:, k], abs=1e-5)
+        slopes = [np.asarray(ca.DM(block.jacobian(x + s * e, data, shared)[0])) for s in (1, -1)]
+        bend = (slopes[0] - slopes[1]).T @ lam / (2 * h)
+        assert bend == pytest.approx(hessian[:, k], abs=1e-3)
+
+
+def test_fast_torques_are_those_of_the_walker(solver: GaitSolver) -> None:
+    rng = np.random.default_rng(2)
+    torques = actuator_torques(solver.walker)
+    for _ in range(20):
+        q, v, a = 0.3 * rng.normal(size=10), 3 * rng.normal(size=10), rng.uniform(size=14)
+        muscle, orthosis = (np.asarray(k).ravel() for k in torques(q, v, a, [40, 50, 10, 20]))
+        assert muscle == pytest.approx(solver.walker.muscle_torques(q, v, a), abs=1e-10)
+        wanted = solver.walker.orthosis_torques(q, (40, 50), (10, 20))
+        assert orthosis == pytest.approx(wanted, abs=1e-10)
+
+
+def test_no_row_and_no_unknown_is_constrained_twice(program: CollocationProgram) -> None:
+    """The Jacobian of equalities and fixed unknowns has full rank at a random point."""
+    nlp = program.program
+    x = 0.3 * np.random.default_rng(1).normal(size=nlp.size)
+    lower, upper = program.bounds
+    jacobian = np.asarray(ca.DM(nlp.functions()["jac_g"](x, program.parameters)[1]))
+    equal = jacobian[nlp.lower == nlp.upper][:, lower < upper]
+    values = np.linalg.svd(equal / np.linalg.norm(equal, axis=1)[:, None], compute_uv=False)
+    assert values[-1] > 1e-9
+    assert equal.shape[0] < equal.shape[1]
+
+
+def test_motion_and_unknowns_are_inverse(program: CollocationProgram) -> None:
+    x = np.random.default_rng(4).normal(size=program.program.size)
+    assert program.to_unknowns(program.to_motion(x)) == pytest.approx(x, abs=1e-12)
+
+
+def test_multipliers_carry_over_unchanged_to_the_same_mesh(program: CollocationProgram) -> None:
+    from pathwalker_cli.ocp.ipopt import Multipliers
+
+    rng = np.random.default_rng(6)
+    before = Multipliers(np.zeros(program.program.size), rng.normal(size=program.program.rows))
+    after = transferred(program, before, program)
+    assert after.rows == pytest.approx(before.rows, abs=1e-12)
+
+
+def test_stylised_stride_stands_on_the_ground(solver: GaitSolver) -> None:
+    for i, phase in enumerate(PHASES):
+        for share in (0.1, 0.5, 0.9):
+            points = solver.walker.contact_points(solver.stride.coordinates(i, share))
+            for name in phase.points:
+                row = ("heel_r", "toe_r", "heel_l", "toe_l").index(name)
+                assert abs(points[row, 1]) < 0.02, (phase.name, name, share)
+
+
+def test_recorded_stride_is_closed_and_begins_at_left_toe_off(solver: GaitSolver) -> None:
+    recording = read_recording(solver.walker.patient, "barefoot", "3053171")
+    stride = recorded_stride(solver.walker, recording)
+    values = stride.trajectory.values
+    assert values[-1, 1:] == pytest.approx(values[0, 1:], abs=5e-2)
+    assert stride.durations.sum() == pytest.approx(stride.trajectory.duration)
+    assert 0.4 < values[-1, 0] < 0.9
+    left = [solver.walker.contact_points(q)[2:, 1].min() for q in values]
+    assert np.mean(left[5:20]) > 0.01  # the left foot swings first
+
+
+def test_bounds_come_from_barefoot_recordings_config_or_fallback(solver: GaitSolver) -> None:
+    walker = solver.walker
+    recorded = walker.patient.recorded["barefoot"].joint_ranges["knee_r"]
+    table = gait_bounds(walker, BoundsConfig(joint_range_margin=0.1)).table
+    assert table.find("knee_r") == pytest.approx((recorded[0] - 0.1, recorded[1] + 0.1))
+    table = gait_bounds(walker, BoundsConfig(joint_ranges={"knee_r": (0.3, 1.2)})).table
+    assert table.find("knee_r") == (0.3, 1.2)
+    stranger = replace(walker, patient=walker.patient.model_copy(update={"recorded": {}}))
+    bounds = gait_bounds(stranger, BoundsConfig())
+    assert "fallback" in bounds.sources["knee_r"]
+    assert "fallback" in bounds.sources["walking_speed"]
+
+
+def test_a_recorded_start_without_recordings_is_refused() -> None:
+    config = _config(patient=CHILD)
+    start = config.start.model_copy(update={"gait": "recorded"})
+    with pytest.raises(DataError, match="no barefoot recording of a whole stride"):
+        GaitSolver(config.model_copy(update={"start": start}))
+
+
+def test_mesh_follows_durations_and_errors() -> None:
+    meshes = meshing.by_duration(np.array([0.1, 0.3, 0.02]), 42, 3)
+    assert [len(mesh) - 1 for mesh in meshes] == [10, 30, 3]
+    errors = meshing.Reintegration(
+        tuple(np.array([0.0] * (len(m) - 2) + [0.1]) for m in meshes),
+        tuple(np.zeros(len(m) - 1) for m in meshes),
+    )
+    finer = meshing.refined(meshes, errors, 1e-3, 1e-2, order=3)
+    assert [len(mesh) - 1 for mesh in finer] == [13, 33, 6]
+    assert all(np.all(np.diff(mesh) > 0) for mesh in finer)
+
+
+def test_an_unfinished_solve_is_sealed_and_names_what_is_violated() -> None:
+    config = _config()
+    solver = config.solver.model_copy(update={"max_iterations": 3})
+    mesh = config.mesh.model_copy(update={"start_intervals_per_phase": 2, "intervals": 0})
+    solution = solve_study(config.model_copy(update={"solver": solver, "mesh": mesh}))
+    assert solution.status == "the iteration limit was reached"
+    with pytest.raises(NotConvergedError, match="did not converge"):
+        _ = solution.series
+    assert solution.violations[0].amount > 1e-3
+    assert " in " in solution.violations[0].name and "% of the phase" in solution.violations[0].name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("changes", [{}, {"patient": CHILD}, {"problem": "mapd-barefoot"}])
+def test_full_solve(changes: dict[str, str]) -> None:
+    solution = solve_study(_config(**changes))
+    assert solution.converged
+    assert solution.violations[0].amount < 1e-6
+    assert solution.second_engine < 1e-6
+    assert solution.reintegration.worst_position < 1e-3
+    assert solution.reintegration.worst_velocity < 1e-2
+    series = solution.series
+    assert series.force[:, 1::2].min() > -1e-6
+    least = solution.bounds.table.entries[("walking_speed",)][0]
+    assert series.distance / series.duration > least - 1e-6
