@@ -170,7 +170,8 @@ def test_an_unfinished_solve_is_sealed_and_names_what_is_violated() -> None:
     with pytest.raises(NotConvergedError, match="did not converge"):
         _ = solution.series
     assert solution.violations[0].amount > 1e-3
-    assert " in " in solution.violations[0].name and "% of the phase" in solution.violations[0].name
+    assert " in " in solution.violations[0].name
+    assert "% of the phase" in solution.violations[0].name
 
 
 @pytest.mark.slow

@@ -163,7 +163,8 @@ def test_points_in_the_air_carry_no_force(shod: Walker) -> None:
 def test_shapes_and_orders(shod: Walker) -> None:
     points = shod.contact_points(np.zeros(10))
     assert points.shape == (4, 2)
-    assert points[0, 0] < points[1, 0] and points[0, 1] < points[1, 1] < 0
+    assert points[0, 0] < points[1, 0]
+    assert points[0, 1] < points[1, 1] < 0
     right, left = shod.orthosis_torques(np.zeros(10), (45.9, 62.8), (13.2, 19.7))
     assert right == pytest.approx(float(orthosis_torque(RIGHT, np.array(0.0), 45.9, 13.2)))
     assert left == pytest.approx(float(orthosis_torque(LEFT, np.array(0.0), 62.8, 19.7)))
