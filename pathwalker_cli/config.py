@@ -156,7 +156,7 @@ class SolverConfig(YamlModel):
     constraint_tolerance: Annotated[float, Quantity("", 1e-12, 1e-3)] = 1e-9
     max_iterations: Annotated[int, Field(ge=1, le=100000)] = 1000
     fine_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-3
-    refined_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-6
+    refined_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-5
     ipopt: dict[str, float | int | str] = Field(default_factory=dict)
 
 

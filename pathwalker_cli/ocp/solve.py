@@ -42,6 +42,9 @@ _TRACKING = GaitWeights(effort=0.0, rate=0.0, tracking=10.0, reserve=10.0, smoot
 _FADED = 0.02
 """Share of the orthosis that acts in the first stage."""
 
+_NEAR_ITERATIONS = 60
+"""A refined solve that takes longer has lost the last solution."""
+
 StageObserver = Callable[[str, ProgressReport], None]
 
 
@@ -303,25 +306,42 @@ class GaitSolver:
     ) -> tuple[CollocationProgram, NlpResult, Reintegration]:
         """Solve on the fine mesh and refine it until an independent integrator agrees."""
         mesh, solver = self.config.mesh, self.config.solver
+        tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
         meshes = meshing.by_duration(
             motion.durations, mesh.intervals, mesh.least_intervals_per_phase
         )
-        settings = self._settings(
-            solver.tolerance, solver.fine_initial_barrier, warm=before is not None
-        )
-        tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
+        warm = before is not None
+        settings = self._settings(solver.tolerance, solver.fine_initial_barrier, warm)
         for attempt in range(mesh.refinements + 1):
-            name = f"refined {attempt}" if attempt else "fine"
             start = motion.resampled(meshes, mesh.degree)
-            program, result = self.stage(name, start, numbers, settings, before)
+            if attempt:
+                program, result = self._refined(f"refined {attempt}", start, numbers, before)
+            else:
+                program, result = self.stage("fine", start, numbers, settings, before)
             before = (program, result)
-            settings = self._settings(solver.tolerance, solver.refined_initial_barrier, warm=True)
             motion = program.to_motion(result.unknowns)
             errors = self._reintegrated(motion)
             if not result.converged or _within(errors, tolerances) or self._interrupted:
                 break
             meshes = meshing.refined(meshes, errors, *tolerances, order=mesh.degree)
         return program, result, errors
+
+    def _refined(
+        self,
+        name: str,
+        start: PhasedMotion,
+        numbers: ProblemNumbers,
+        before: tuple[CollocationProgram, NlpResult] | None,
+    ) -> tuple[CollocationProgram, NlpResult]:
+        """Solve on a refined mesh, close to the last solution; from further away if that fails."""
+        solver = self.config.solver
+        near = self._settings(solver.tolerance, solver.refined_initial_barrier, warm=True)
+        near = replace(near, max_iterations=min(_NEAR_ITERATIONS, solver.max_iterations))
+        program, result = self.stage(name, start, numbers, near, before)
+        if result.converged or self._interrupted:
+            return program, result
+        far = self._settings(solver.tolerance, solver.fine_initial_barrier, warm=True)
+        return self.stage(f"{name} again", start, numbers, far, before)
 
     def _reintegrated(self, motion: PhasedMotion) -> Reintegration:
         began = time.perf_counter()
