@@ -43,8 +43,9 @@ those, not this. -->
 
 A config is a YAML file; unknown keys, numbers outside their range and text in place of numbers are
 refused with one sentence that names file, line and key. Units are SI and radians and are never
-written beside a number. Paths are relative to the config's folder. `--set section.key=value`
-overrides a key on the command line. `mapd-barefoot.yaml` has the keys of `mapd-orthosis.yaml`.
+written beside a number. Paths are relative to the config's folder; those of C3D files and markers
+may also be relative to where the command is run. `--set section.key=value` overrides a key on the
+command line. `mapd-barefoot.yaml` has the keys of `mapd-orthosis.yaml`.
 
 *What and why* is the comment that stands beside the key in the shipped file.
 """
@@ -68,7 +69,7 @@ def page() -> str:
 def reasons(path: Path) -> dict[str, str]:
     """Return the comment of every dotted key of a YAML file.
 
-    A comment goes on in the lines below it that hold nothing but a comment, further in than the key.
+    A comment goes on in the lines below it that hold only a comment, further in than the key.
     """
     found: dict[str, str] = {}
     parents: list[tuple[int, str]] = []

@@ -40,6 +40,7 @@ Range = Annotated[tuple[Angle, Angle], AS_TUPLE]
 Seconds = Annotated[float, Quantity("s", 0.005, 2.0, above="is it in milliseconds?")]
 Weight = Annotated[float, Quantity("", 0.0, 1e6)]
 Share = Annotated[float, Quantity("", 0.0, 1.0)]
+Metres = Annotated[float, Quantity("m", 0.05, 5.0, above="is it in centimetres?")]
 Speed = Annotated[float, Quantity("m/s", 0.0, 3.0, above="is it in km/h or cm/s?")]
 
 
@@ -66,7 +67,7 @@ class CostConfig(YamlModel):
 
     effort_weight: Weight = 1.0
     rate_weight: Weight = 2e-2
-    acceleration_weight: Weight = 5e-4
+    acceleration_weight: Weight = 1e-3
     walking_speed_weight: Weight = 0.0
 
 
@@ -93,7 +94,7 @@ class BoundsConfig(YamlModel):
     phase_durations: dict[str, Annotated[tuple[Seconds, Seconds], AS_TUPLE]] = Field(
         default_factory=dict
     )
-    distance: Annotated[tuple[float, float], AS_TUPLE] = (0.3, 3.0)
+    distance: Annotated[tuple[Metres, Metres], AS_TUPLE] = (0.3, 3.0)
     joint_speed: Annotated[float, Quantity("rad/s", 1.0, 100.0)] = 30.0
     dorsiflexion_stiffness: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE] | None = None
     plantarflexion_stiffness: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE] | None = None
@@ -156,7 +157,7 @@ class SolverConfig(YamlModel):
     constraint_tolerance: Annotated[float, Quantity("", 1e-12, 1e-3)] = 1e-9
     max_iterations: Annotated[int, Field(ge=1, le=100000)] = 1000
     fine_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-3
-    refined_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-5
+    refined_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-6
     ipopt: dict[str, float | int | str] = Field(default_factory=dict)
 
 

@@ -47,9 +47,9 @@ def refined(
     result = []
     for mesh, position, velocity in zip(meshes, errors.position, errors.velocity, strict=True):
         ratio = np.maximum(position / position_tolerance, velocity / velocity_tolerance)
-        # a third of the tolerance is aimed at: the next solution moves a little
-        parts = np.ceil(np.clip(3.0 * ratio, 1e-9, 1e6) ** (1.0 / order))
-        parts = np.where(ratio > 1.0 / 3.0, np.clip(parts, 2, 4), 1).astype(int)
+        # half the tolerance is aimed at: the next solution moves a little
+        parts = np.ceil(np.clip(2.0 * ratio, 1e-9, 1e6) ** (1.0 / order))
+        parts = np.where(ratio > 1.0, np.clip(parts, 2, 4), 1).astype(int)
         pieces = [
             np.linspace(mesh[i], mesh[i + 1], n + 1)[:-1] for i, n in enumerate(parts.tolist())
         ]

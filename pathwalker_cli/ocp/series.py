@@ -11,6 +11,7 @@ import numpy as np
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES
 from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.model.muscle import excitation_from_rate
+from pathwalker_cli.model.orthosis import orthosis_torque
 from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
@@ -105,8 +106,6 @@ def actuator_torques(walker: Walker) -> ca.Function:
 
     The stiffness is (K_D right, left, K_P right, left) [N m/rad], empty for a barefoot walker.
     """
-    from pathwalker_cli.model.orthosis import orthosis_torque
-
     q, v, a = (ca.SX.sym(name, size) for name, size in (("q", 10), ("v", 10), ("a", 14)))
     k = ca.SX.sym("k", 4 if walker.orthosis else 0)
     muscle = [

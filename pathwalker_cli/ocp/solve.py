@@ -42,7 +42,7 @@ _TRACKING = GaitWeights(effort=0.0, rate=0.0, tracking=10.0, reserve=10.0, smoot
 _FADED = 0.02
 """Share of the orthosis that acts in the first stage."""
 
-_NEAR_ITERATIONS = 60
+_NEAR_ITERATIONS = 200
 """A refined solve that takes longer has lost the last solution."""
 
 StageObserver = Callable[[str, ProgressReport], None]
@@ -311,7 +311,8 @@ class GaitSolver:
             motion.durations, mesh.intervals, mesh.least_intervals_per_phase
         )
         warm = before is not None
-        settings = self._settings(solver.tolerance, solver.fine_initial_barrier, warm)
+        loose = max(solver.tolerance, 1e-5) if mesh.refinements else solver.tolerance
+        settings = self._settings(loose, solver.fine_initial_barrier, warm)
         for attempt in range(mesh.refinements + 1):
             start = motion.resampled(meshes, mesh.degree)
             if attempt:
@@ -321,7 +322,8 @@ class GaitSolver:
             before = (program, result)
             motion = program.to_motion(result.unknowns)
             errors = self._reintegrated(motion)
-            if not result.converged or _within(errors, tolerances) or self._interrupted:
+            done = _within(errors, tolerances) and (attempt > 0 or loose == solver.tolerance)
+            if not result.converged or done or self._interrupted:
                 break
             meshes = meshing.refined(meshes, errors, *tolerances, order=mesh.degree)
         return program, result, errors

@@ -1,0 +1,229 @@
+"""The documentation: generated pages are fresh, examples run, links, names and keys exist."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from conftest import MadeSolution
+from pathwalker_cli import __version__, load_patient
+from pathwalker_cli.config import PROBLEMS, StudyConfig, load_config
+from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS
+from pathwalker_cli.inverse.study import InverseDynamicsConfig
+from pathwalker_cli.io.yaml_file import read_mapping, validate
+from pathwalker_cli.model.contact import PHASES
+from pathwalker_cli.output.figures import FIGURES
+from pathwalker_cli.output.run_folder import ENTRIES
+from pathwalker_cli.output.run_metrics import RunInputs, run_metrics
+
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+GENERATED = {"commands.md": "generate_commands.py", "configuration.md": "generate_configuration.py"}
+LINK = re.compile(r"!?\[[^\]]*\]\((?P<target>[^)\s]+)\)")
+# Machines, places that only exist while something is made, and how it is made.
+FORBIDDEN = re.compile(
+    r"/work\b|/tmp\b|/home/|/root/|\bshared/|pypi\.org|pythonhosted|\bissues?\b|\bsessions?\b",
+    re.IGNORECASE,
+)
+TOKEN = re.compile(r"@[A-Z][A-Z0-9_]*@")
+# A backticked name below the package, e.g. `model.muscle.activation_rate`.
+NAME = re.compile(r"`((?:model|ocp|output|inverse|io|conventions|config)(?:\.\w+)+)`")
+
+
+def pages() -> list[Path]:
+    """Return all Markdown files of the project."""
+    found = [path for pattern in ("*.md", "docs/*.md", "patient_data/**/*.md")
+             for path in ROOT.glob(pattern)]  # fmt: skip
+    return sorted(found)
+
+
+def page_id(path: Path) -> str:
+    """Return the name of a page in test reports."""
+    return str(path.relative_to(ROOT))
+
+
+@cache
+def script(name: str) -> ModuleType:
+    """Import a script of the documentation."""
+    spec = spec_from_file_location(name.removesuffix(".py"), DOCS / name)
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def text_of(name: str) -> str:
+    """Return the text of a page."""
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """Return the code blocks of a page in a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", text_of(page), re.MULTILINE | re.DOTALL)
+
+
+# Generated pages
+
+
+@pytest.mark.parametrize("name", GENERATED)
+def test_generated_page_is_fresh(name: str) -> None:
+    wanted = script(GENERATED[name]).page()
+    mend = f"run: python docs/{GENERATED[name]}"
+    assert (DOCS / name).read_text(encoding="utf-8") == wanted, mend
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_shipped_config_holds_the_defaults(problem: str) -> None:
+    config = load_config(problem)
+    assert config == StudyConfig(problem=problem, patient=config.patient)
+
+
+def test_shipped_inverse_dynamics_holds_the_defaults() -> None:
+    mapping, _ = read_mapping(ROOT / "configs" / "inverse-dynamics.yaml")
+    given = validate(mapping, InverseDynamicsConfig)
+    assert given == InverseDynamicsConfig(study="inverse-dynamics", patient=given.patient)
+
+
+def test_comments_become_reasons(tmp_path: Path) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_text(
+        "# head\nouter:\n  a: 1   # first\n         # second\n\n  b: 2\n# alone\nc: 3  # third\n",
+        encoding="utf-8",
+    )
+    assert script("generate_configuration.py").reasons(path) == {
+        "outer": "", "outer.a": "first second", "outer.b": "", "c": "third",
+    }  # fmt: skip
+
+
+# README
+
+
+def test_readme_python_runs() -> None:
+    walker_part, solve_part = blocks("README.md", "python")
+    names: dict[str, Any] = {}
+    exec(walker_part, names)
+    assert names["muscle"].shape == (14,)
+    assert names["orthosis"].shape == (2,)
+    assert names["vdot"].shape == names["tau"].shape == (10,)
+    assert names["forces"].shape == (8,)
+    assert names["points"].shape == (4, 2)
+    assert np.isfinite(names["vdot"]).all()
+    imports = [line for line in solve_part.splitlines() if line.startswith("from ")]
+    exec("\n".join(imports), names)
+    assert "solve_study" in names
+
+
+def test_readme_patient_and_study_are_accepted(tmp_path: Path) -> None:
+    patient, study = blocks("README.md", "yaml")
+    (tmp_path / "my-patient.yaml").write_text(patient, encoding="utf-8")
+    (tmp_path / "my-study.yaml").write_text(study, encoding="utf-8")
+    config = load_config(tmp_path / "my-study.yaml", "mapd-orthosis")
+    assert load_patient(config.patient).require_orthosis().free_play == 0.01
+
+
+def test_readme_has_no_unfilled_figure() -> None:
+    assert TOKEN.findall(text_of("README.md")) == []
+
+
+# All pages
+
+
+@pytest.mark.parametrize("path", pages(), ids=page_id)
+def test_relative_links_resolve(path: Path) -> None:
+    for match in LINK.finditer(path.read_text(encoding="utf-8")):
+        target, _, anchor = match["target"].partition("#")
+        if target.startswith(("http://", "https://")):
+            continue
+        linked = path.parent / target if target else path
+        assert linked.exists(), match["target"]
+        if anchor:
+            headings = re.findall(r"^#+ (.*)$", linked.read_text(encoding="utf-8"), re.MULTILINE)
+            slugs = {re.sub(r"[^\w -]", "", text.lower()).replace(" ", "-") for text in headings}
+            assert anchor in slugs, match["target"]
+
+
+@pytest.mark.parametrize("path", pages(), ids=page_id)
+def test_no_page_tells_of_the_workshop(path: Path) -> None:
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+        assert not FORBIDDEN.search(line), f"line {number}: {line}"
+
+
+def test_every_name_in_the_theory_exists() -> None:
+    names = NAME.findall(text_of("docs/theory.md"))
+    assert len(names) > 40
+    assert [name for name in names if not resolves(name)] == []
+
+
+def resolves(name: str) -> bool:
+    """Return whether a dotted name below the package is a module or something in one."""
+    parts = name.split(".")
+    for length in range(len(parts), 0, -1):
+        try:
+            found: Any = import_module(".".join(["pathwalker_cli", *parts[:length]]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[length:]:
+            declared = getattr(found, "__annotations__", {})
+            if not hasattr(found, part):
+                return part in declared
+            found = getattr(found, part)
+        return True
+    return False
+
+
+# Single pages
+
+
+def test_theory_states_the_phases_as_they_are() -> None:
+    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", text_of("docs/theory.md"), re.MULTILINE)
+    assert [name for name, _ in rows] == [phase.name for phase in PHASES]
+    following = PHASES[1:] + PHASES[:1]
+    for (_, cells), phase, after in zip(rows, PHASES, following, strict=True):
+        wanted = (phase.forces, phase.touched_down(after), phase.lifted_off(after))
+        for cell, forces in zip(cells.split("|"), wanted, strict=True):
+            assert spelled_out(cell) == set(forces)
+
+
+def spelled_out(cell: str) -> set[str]:
+    """Return the forces of a cell such as "right heel x z, toe z"."""
+    found, side = set(), ""
+    for part in cell.strip(" -").split(","):
+        words = part.split()
+        if words and words[0] in ("right", "left"):
+            side = words.pop(0)[0]
+        found |= {f"{words[0]}_{side}_{axis}" for axis in words[1:]}
+    return found
+
+
+def test_conventions_name_every_key_of_the_metrics(made_solution: MadeSolution) -> None:
+    text = text_of("docs/conventions.md")
+    for problem in PROBLEMS:
+        metrics = run_metrics(made_solution(problem), RunInputs({}))
+        missing = [key for key in (*metrics, "motion_hash") if f"`{key}`" not in text]
+        assert not missing
+
+
+def test_conventions_name_every_file_coordinate_and_force() -> None:
+    text = text_of("docs/conventions.md")
+    files = [f"{entry}/" if entry == "figures" else entry for entry in ENTRIES]
+    for name in (*files, *COORDINATES, *GENERATORS, *CONTACT_FORCES, *FIGURES):
+        assert f"`{name}`" in text, name
+
+
+def test_citation_is_complete_and_of_this_version() -> None:
+    citation = yaml.safe_load(text_of("CITATION.cff"))
+    assert {"cff-version", "message", "title", "authors"} <= citation.keys()
+    assert citation["version"] == __version__
+    assert f"## [{__version__}] - {citation['date-released']}" in text_of("CHANGELOG.md")
+    assert citation["license"] == "BSD-3-Clause"
+    assert text_of("LICENSE").startswith("BSD 3-Clause License")
