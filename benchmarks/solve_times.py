@@ -21,7 +21,9 @@ def cpu_seconds() -> float:
     return usage.ru_utime + usage.ru_stime
 
 
-def summary(solution: GaitSolution, build_cpu: float, total_cpu: float, wall: float) -> dict[str, object]:
+def summary(
+    solution: GaitSolution, build_cpu: float, total_cpu: float, wall: float
+) -> dict[str, object]:
     """Return the figures of one run."""
     stages = [
         {

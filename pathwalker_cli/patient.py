@@ -182,6 +182,10 @@ class Patient(YamlModel):
         ]
         if self.contact_points.barefoot is None:
             notes.append("contact points barefoot: from foot length and height by proportion")
+        if self.sex == "female":
+            notes.append(
+                "segment masses: Jensen's regressions are for boys; none for girls is used"
+            )
         if self.age_for_regressions is not None:
             notes.append(
                 f"age for Jensen's regressions: {self.age_for_regressions:g} years instead of "
