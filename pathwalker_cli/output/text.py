@@ -21,7 +21,7 @@ stay a little away from every bound, by far less than this."""
 
 _SYMBOLS: Final = {"dorsiflexion_stiffness": "K_D", "plantarflexion_stiffness": "K_P"}
 
-_NOT_FROM: Final = {"upper": "above", "lower": "below"}
+_WISH: Final = {"upper": "stiffer", "lower": "softer"}
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ActiveBound:
         """Say what it means for the result."""
         return (
             f"{self.name} sits at its {self.end} limit of {self.limit:.4g} {self.unit}: "
-            f"the data do not determine it from {_NOT_FROM[self.end]}"
+            f"least effort alone would take a {_WISH[self.end]} spring than the range allows"
         )
 
 
