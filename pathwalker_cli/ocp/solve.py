@@ -276,8 +276,7 @@ class GaitSolver:
             motion = program.to_motion(result.unknowns)
         if mesh.intervals and not self._interrupted:
             motion = motion if warm_start is None else warm_start
-            before = (program, result) if warm_start is None else None
-            program, result, errors = self._fine(motion, numbers, before)
+            program, result, errors = self._fine(motion, numbers)
         else:
             errors = self._reintegrated(program.to_motion(result.unknowns))
         return self._finish(program, result, errors, warm_start is not None)
@@ -302,7 +301,6 @@ class GaitSolver:
         self,
         motion: PhasedMotion,
         numbers: ProblemNumbers,
-        before: tuple[CollocationProgram, NlpResult] | None,
     ) -> tuple[CollocationProgram, NlpResult, Reintegration]:
         """Solve on the fine mesh and refine it until an independent integrator agrees."""
         mesh, solver = self.config.mesh, self.config.solver
@@ -310,22 +308,19 @@ class GaitSolver:
         meshes = meshing.by_duration(
             motion.durations, mesh.intervals, mesh.least_intervals_per_phase
         )
-        warm = before is not None
         loose = max(solver.tolerance, 1e-5) if mesh.refinements else solver.tolerance
-        settings = self._settings(loose, solver.fine_initial_barrier, warm)
-        for attempt in range(mesh.refinements + 1):
-            start = motion.resampled(meshes, mesh.degree)
-            if attempt:
-                program, result = self._refined(f"refined {attempt}", start, numbers, before)
-            else:
-                program, result = self.stage("fine", start, numbers, settings, before)
-            before = (program, result)
-            motion = program.to_motion(result.unknowns)
-            errors = self._reintegrated(motion)
-            done = _within(errors, tolerances) and (attempt > 0 or loose == solver.tolerance)
+        settings = self._settings(loose, solver.fine_initial_barrier)
+        start = motion.resampled(meshes, mesh.degree)
+        program, result = self.stage("fine", start, numbers, settings)
+        errors = self._reintegrated(program.to_motion(result.unknowns))
+        for attempt in range(1, mesh.refinements + 1):
+            done = _within(errors, tolerances) and (attempt > 1 or loose == solver.tolerance)
             if not result.converged or done or self._interrupted:
                 break
             meshes = meshing.refined(meshes, errors, *tolerances, order=mesh.degree)
+            start = program.to_motion(result.unknowns).resampled(meshes, mesh.degree)
+            program, result = self._refined(f"refined {attempt}", start, numbers, (program, result))
+            errors = self._reintegrated(program.to_motion(result.unknowns))
         return program, result, errors
 
     def _refined(
@@ -333,7 +328,7 @@ class GaitSolver:
         name: str,
         start: PhasedMotion,
         numbers: ProblemNumbers,
-        before: tuple[CollocationProgram, NlpResult] | None,
+        before: tuple[CollocationProgram, NlpResult],
     ) -> tuple[CollocationProgram, NlpResult]:
         """Solve on a refined mesh, close to the last solution; from further away if that fails."""
         solver = self.config.solver
