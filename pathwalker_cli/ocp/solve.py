@@ -42,7 +42,7 @@ _TRACKING = GaitWeights(effort=0.0, rate=0.0, tracking=10.0, reserve=10.0, smoot
 _FADED = 0.02
 """Share of the orthosis that acts in the first stage."""
 
-_NEAR_ITERATIONS = 200
+_NEAR_ITERATIONS = 40
 """A refined solve that takes longer has lost the last solution."""
 
 StageObserver = Callable[[str, ProgressReport], None]
@@ -330,15 +330,15 @@ class GaitSolver:
         numbers: ProblemNumbers,
         before: tuple[CollocationProgram, NlpResult],
     ) -> tuple[CollocationProgram, NlpResult]:
-        """Solve on a refined mesh, close to the last solution; from further away if that fails."""
+        """Solve on a refined mesh, close to the last solution; without multipliers if that fails."""
         solver = self.config.solver
         near = self._settings(solver.tolerance, solver.refined_initial_barrier, warm=True)
         near = replace(near, max_iterations=min(_NEAR_ITERATIONS, solver.max_iterations))
         program, result = self.stage(name, start, numbers, near, before)
         if result.converged or self._interrupted:
             return program, result
-        far = self._settings(solver.tolerance, solver.fine_initial_barrier, warm=True)
-        return self.stage(f"{name} again", start, numbers, far, before)
+        far = self._settings(solver.tolerance, solver.fine_initial_barrier)
+        return self.stage(f"{name} again", start, numbers, far)
 
     def _reintegrated(self, motion: PhasedMotion) -> Reintegration:
         began = time.perf_counter()
