@@ -330,7 +330,7 @@ class GaitSolver:
         numbers: ProblemNumbers,
         before: tuple[CollocationProgram, NlpResult],
     ) -> tuple[CollocationProgram, NlpResult]:
-        """Solve on a refined mesh, close to the last solution; without multipliers if that fails."""
+        """Solve on a refined mesh from the last solution; without multipliers if that fails."""
         solver = self.config.solver
         near = self._settings(solver.tolerance, solver.refined_initial_barrier, warm=True)
         near = replace(near, max_iterations=min(_NEAR_ITERATIONS, solver.max_iterations))
