@@ -44,7 +44,7 @@ class ActiveBound:
         """Say what it means for the result."""
         return (
             f"{self.name} sits at its {self.end} limit of {self.limit:.4g} {self.unit}: "
-            f"least effort alone would take a {_WISH[self.end]} spring than the range allows"
+            f"least effort wants a {_WISH[self.end]} spring"
         )
 
 
