@@ -292,6 +292,11 @@ class CollocationProgram:
                 columns.append(np.concatenate([once, *point, *ends]))
         return np.array(columns).T
 
+    @cached_property
+    def _points(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Fractions (N, d) and data (2 + m, N, d) of the points of every phase."""
+        return tuple(self._point_data(i) for i in range(len(self.meshes)))
+
     def _point_data(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Return fractions of the phase (N, d) and data (2 + m, N, d) of its points."""
         mesh, times = self.meshes[i], collocation_times(self.blocks.degree)
@@ -309,7 +314,7 @@ class CollocationProgram:
     def _point_rows(self, i: int, kind: str) -> Occurrences:
         phase = self.blocks.problem.phases[i]
         rows: Rows = getattr(phase, kind)
-        fractions, data = self._point_data(i)
+        fractions, data = self._points[i]
         count = fractions.size
         lower, upper = self._row_bounds(rows, phase.name)
         lower, upper = (np.tile(k[:, None], count) for k in (lower, upper))
@@ -330,7 +335,7 @@ class CollocationProgram:
 
     def _end_rows(self, i: int) -> Occurrences:
         phase = self.blocks.problem.phases[i]
-        _, data = self._point_data(i)
+        _, data = self._points[i]
         lower, upper = self._row_bounds(phase.end, phase.name)
         return Occurrences(
             self.blocks.phases[i].end,
@@ -356,7 +361,7 @@ class CollocationProgram:
             for node in (left, right):
                 parts += [layout.smooth[node], layout.controls[node], layout.integrals[node]]
             columns.append(np.concatenate(parts))
-        _, data = self._point_data(i)
+        _, data = self._points[i]
         points = np.moveaxis(data[2:], 0, -1).reshape(count, -1)
         names = [f"{s} rate at point {k + 1}" for k in range(d) for s in problem.states.names]
         names += [f"{s} rate" for s in problem.smooth.names]
