@@ -165,6 +165,69 @@ def test_doubtful_stances_are_not_measured(made: dict[str, float], reason: str) 
     assert np.isnan(forces.force["right"][40:80]).all()
 
 
+def two_steps(part: float = 0.0, standing_on: float = 1.0) -> Recording:
+    """Return a recording in which each foot has a plate; the left strikes while the right stands.
+
+    Args:
+        part: Share of the left foot's load that falls on the right foot's plate, for ten frames.
+        standing_on: Share of the right foot's load that its plate carries.
+    """
+    model, motion, heel = standing()
+    weight = GRAVITY * pin.computeTotalMass(model)
+    ahead = float(foot_extents(model, motion.values[:1])["left"][0, 0]) - heel
+    shift = np.array([ahead, 0.0, 0.0])
+    frame = np.arange(FRAMES * PER_FRAME) / PER_FRAME
+    right = weight * (np.interp(frame, [76, 90], [1.0, 0.0]) * (frame >= 30))
+    left = weight * (np.interp(frame, [76, 90], [0.0, 1.0]) * (frame < 115))
+    onto = part * left * ((frame >= 76) & (frame < 86))
+    under_right, under_left = np.array([heel + 0.1, 0.0]), np.array([heel + 0.05, 0.0])
+    first = _load(standing_on * right, under_right) + _load(onto, under_left + shift[:2])
+    second = _load(left - onto, under_left)
+    events = (
+        Event("right", "foot_strike", 30),
+        Event("left", "toe_off", 32),
+        Event("left", "foot_strike", 76),
+        Event("right", "toe_off", 90),
+        Event("right", "foot_strike", 112),
+        Event("left", "toe_off", 115),
+    )
+    plates = (
+        ForcePlate("plate 1", CORNERS, A, B, DEPTH, first),
+        ForcePlate("plate 2", CORNERS + shift, A, B, DEPTH, second),
+    )
+    return Recording("made", 120.0, (), np.zeros((FRAMES, 0, 3)), events, plates, PER_FRAME)
+
+
+def _load(up: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Return the channels of a plate under a vertical force at one of its points."""
+    return channels(np.outer(up, [0.0, 0.0, 1.0]), np.tile(point, (up.size, 1)))
+
+
+@pytest.mark.parametrize(
+    ("made", "right", "left"),
+    [
+        ({}, "", ""),
+        (
+            {"part": 0.5},
+            "plate 1 also carries the left foot from frame 76",
+            "plate 1 carries part of the foot from frame 76",
+        ),
+        (
+            {"part": 0.5, "standing_on": 0.0},
+            "no plate below the foot",
+            "plate 1 carries part of the foot from frame 76",
+        ),
+    ],
+)
+def test_a_foot_on_two_plates_spoils_both(made: dict[str, float], right: str, left: str) -> None:
+    model, motion, _ = standing()
+    forces = ground_forces(two_steps(**made), model, motion, WalkingPlane(axis=0, sign=1))
+    assert [(item.stance.side, item.reason) for item in forces.stances] == [
+        ("right", right),
+        ("left", left),
+    ]
+
+
 def test_columns_of_the_table() -> None:
     model, motion, _ = standing()
     table = ground_forces(recording(), model, motion).trajectory()
@@ -190,6 +253,7 @@ def test_no_plates_is_an_error() -> None:
         ("barefoot/3053184", "-y", "l"),
         ("orthosis/3053141", "-y", "lr"),
         ("orthosis/3053144", "-y", "rl"),
+        ("orthosis/3053145", "+y", ""),  # the left heel lands on the right foot's plate
         ("orthosis/3053146", "-y", "l"),
         ("orthosis/3053148", "+y", "lr"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -9,11 +10,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pathwalker_cli.conventions import GRAVITY, Condition
+from pathwalker_cli.conventions import COORDINATES, GRAVITY, Condition
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.bands import cycle_band, resampled
-from pathwalker_cli.inverse.cycles import GaitCycle
+from pathwalker_cli.inverse.cycles import GaitCycle, Stance
 from pathwalker_cli.inverse.dynamics import inverse_dynamics
+from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.inverse.process import process_trial
 from pathwalker_cli.inverse.published import TURNED, forward_difference, published_torques
 from pathwalker_cli.inverse.published_tables import (
@@ -23,9 +25,11 @@ from pathwalker_cli.inverse.published_tables import (
     published_strengths,
 )
 from pathwalker_cli.inverse.residuals import residual_range, residuals
+from pathwalker_cli.inverse.stance_checks import StanceForce
 from pathwalker_cli.inverse.strengths import (
     Peak,
     isometric_torque,
+    stance_curves,
     strengths,
     strengths_of,
 )
@@ -139,6 +143,19 @@ def test_flexion_and_trunk_follow_from_extension() -> None:
     assert found == pytest.approx(np.array(published), abs=2e-5)
     with pytest.raises(DataError, match="no measured stance shows ankle_extension_l"):
         strengths_of(peaks[:-1])
+
+
+def test_cut_off_of_the_motion_reaches_the_stance_curves() -> None:
+    time = np.arange(240) / 120.0
+    fast = np.sin(2.0 * np.pi * 15.0 * time)[:, None]
+    motion = Trajectory(time, COORDINATES, np.tile(fast, 10), ("m", "m", *["rad"] * 8))
+    known = StanceForce(Stance("right", 60, 180), 0, "")
+    trial = StudyTrial("made", "barefoot", motion, (), (), tau=motion, stances=(known,))
+    smooth, kept = (stance_curves([trial], cutoff)["hip_r"][0][:, 2] for cutoff in (4.0, 50.0))
+    assert np.abs(smooth).max() < 0.5
+    assert np.abs(kept).max() == pytest.approx(2.0 * np.pi * 15.0, rel=0.05)
+    unmeasured = replace(trial, stances=(replace(known, reason="no plate below the foot"),))
+    assert stance_curves([unmeasured]) == {}
 
 
 def test_resampled_keeps_lines() -> None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
+import shutil
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
@@ -15,104 +14,26 @@ import pytest
 import yaml
 from click.testing import CliRunner, Result
 
+from made_c3d import cut, folder, motion, text, write_c3d
 from pathwalker_cli.commands.recorded import id_command, ik_command, import_command
 from pathwalker_cli.errors import ConfigError, DataError, InputError
 from pathwalker_cli.inverse.evaluate import dynamics_trials
-from pathwalker_cli.inverse.kinematics import _Fit
-from pathwalker_cli.inverse.markers import load_marker_set, marker_points
 from pathwalker_cli.inverse.study import load_inverse_dynamics, load_inverse_kinematics
 from pathwalker_cli.inverse.study_tables import residual_tables, strength_table, study_warnings
 from pathwalker_cli.io.opensim import read_opensim, write_opensim
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.trajectory_csv import read_trajectory
-from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.output.recorded_figures import joint_torque_figure, save_recorded_figures
 from pathwalker_cli.output.recorded_files import staged_folder
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.patient_blocks import Strengths
 from pathwalker_cli.trajectory import Trajectory
 
-ezc3d = pytest.importorskip("ezc3d")
-
 PATIENT = "sreenivasa2017-patient"
 RECORDINGS = Path(__file__).parents[2] / "shared" / "recordings"
 needs_recordings = pytest.mark.skipif(
     not RECORDINGS.is_dir(), reason="needs shared/recordings beside the checkout"
 )
-FRAMES, PER_FRAME = 120, 2
-EVENTS = [("Left", "Foot Strike", 10), ("Right", "Foot Off", 20), ("Right", "Foot Strike", 50),
-          ("Left", "Foot Off", 60), ("Left", "Foot Strike", 90), ("Right", "Foot Off", 100),
-          ("Right", "Foot Strike", 115)]  # fmt: skip
-
-
-@cache
-def motion() -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return a made motion and the paths of its markers [m], shape (FRAMES, 3) each."""
-    patient = load_patient(PATIENT)
-    model = pinocchio_model(patient, "barefoot")
-    points = marker_points(load_marker_set(), patient, "barefoot")
-    phase = np.linspace(0.0, 2.0, FRAMES)[:, None]
-    q = 0.2 * np.sin(phase * np.arange(1, 11)) + [0, 0.6, 0, -0.3, 0.8, 0, -0.2, 0.9, 0, 0]
-    q[:, 0], q[:, 1] = 0.6 * phase[:, 0], 0.6
-    placed = np.array([_Fit(model, points).positions(row)[0] for row in q])
-    paths = {}
-    for column, point in enumerate(points):
-        x, z = placed[:, column].T
-        paths[point.marker] = np.column_stack([x, np.full(FRAMES, 0.1), z])
-    return q, paths
-
-
-def write_c3d(
-    path: Path,
-    unit: str = "mm",
-    scale: float = 1e3,
-    frames: int = FRAMES,
-    events: bool = True,
-    plate: bool = False,
-    without: str = "",
-    unseen: str = "",
-    nan_channel: bool = False,
-    markers: bool = True,
-) -> Path:
-    """Write a C3D file of the made motion, in order or broken in one way."""
-    paths = {n: p for n, p in motion()[1].items() if markers and n != without}
-    points = np.ones((4, len(paths), frames))
-    for column, positions in enumerate(paths.values()):
-        points[:3, column] = scale * positions[:frames].T
-    if unseen:
-        points[:3, list(paths).index(unseen)] = np.nan
-    file = ezc3d.c3d()
-    file["parameters"]["POINT"]["RATE"]["value"] = [120]
-    file["parameters"]["POINT"]["UNITS"]["value"] = [unit]
-    file["parameters"]["POINT"]["LABELS"]["value"] = list(paths)
-    file["data"]["points"] = points
-    if events:
-        times = np.array([[0.0] * len(EVENTS), [frame / 120 for *_, frame in EVENTS]])
-        file.add_parameter("EVENT", "CONTEXTS", [side for side, *_ in EVENTS])
-        file.add_parameter("EVENT", "LABELS", [kind for _, kind, _ in EVENTS])
-        file.add_parameter("EVENT", "TIMES", times)
-    if plate:
-        _add_plate(file, frames, nan_channel)
-    file.write(str(path))
-    return path
-
-
-def _add_plate(file: Any, frames: int, nan_channel: bool) -> None:
-    """Add a long plate that both feet load from frame 15 to 110."""
-    file["parameters"]["ANALOG"]["RATE"]["value"] = [120 * PER_FRAME]
-    file["parameters"]["ANALOG"]["LABELS"]["value"] = [f"F{i}" for i in range(8)]
-    channels = np.zeros((1, 8, frames * PER_FRAME))
-    channels[0, 4:, 15 * PER_FRAME : 110 * PER_FRAME] = 60.0
-    if nan_channel:
-        channels[0, 6, 40] = np.nan
-    file["data"]["analogs"] = channels
-    corners = 1e3 * np.array([[2.0, 0.3, 0], [-1.0, 0.3, 0], [-1.0, -0.3, 0], [2.0, -0.3, 0]])
-    group = "FORCE_PLATFORM"
-    file.add_parameter(group, "USED", [1])
-    file.add_parameter(group, "TYPE", [3])
-    file.add_parameter(group, "ORIGIN", np.array([[1400.0], [275.0], [27.0]]))
-    file.add_parameter(group, "CORNERS", corners.T[:, :, None])
-    file.add_parameter(group, "CHANNEL", np.arange(1.0, 9.0)[:, None])
 
 
 def run(command: click.Command, *words: object) -> Result:
@@ -160,7 +81,8 @@ def test_import_with_a_plate_writes_forces_and_says_why_they_are_unknown(tmp_pat
     out = tmp_path / "out"
     result = imported(write_c3d(tmp_path / "walk.c3d", plate=True), out)
     assert result.exception is None, result.output
-    assert "plate 1 loaded before or after the stance" in result.output
+    words = "left stance from frame 10 is not measured: plate 1 loaded before or after the stance"
+    assert f"note: walk: {words}" in result.output
     table = read_opensim(out / "walk_grf.mot")
     assert table.names[:4] == (
         "ground_force_r_vx", "ground_force_r_vy", "ground_force_r_vz", "ground_force_r_px"
@@ -183,25 +105,6 @@ def test_import_keeps_other_files_of_the_folder(tmp_path: Path) -> None:
     assert (out / "walk_angles.csv").is_file()
 
 
-def cut(path: Path) -> Path:
-    """Write a C3D file that ends in the middle of its frames."""
-    data = write_c3d(path).read_bytes()
-    path.write_bytes(data[: len(data) * 2 // 3])
-    return path
-
-
-def text(path: Path) -> Path:
-    """Write something that is no C3D file."""
-    path.write_text("a walk, but in words", encoding="utf-8")
-    return path
-
-
-def folder(path: Path) -> Path:
-    """Make a folder without recordings."""
-    path.mkdir()
-    return path
-
-
 BROKEN: dict[str, tuple[Callable[[Path], Path], str]] = {
     "not a C3D": (text, "not a C3D file"),
     "truncated": (cut, r"is cut off: \d+ of its 120 frames are there"),
@@ -218,6 +121,14 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], str]] = {
     "NaN in a plate": (
         lambda p: write_c3d(p, plate=True, nan_channel=True),
         "plate 1 holds NaN or infinity in 1 samples, first in 40",
+    ),
+    "plate without extent": (
+        lambda p: write_c3d(p, plate=True, flat_plate=True),
+        "plate 1 has no extent; allowed: four corners",
+    ),
+    "too slow": (
+        lambda p: write_c3d(p, rate=25.0),
+        "has 25 frames per second; allowed: at least 50",
     ),
     "empty folder": (folder, "no C3D file in this folder"),
     "no such file": (lambda p: p, "no such recording"),
@@ -312,6 +223,7 @@ def test_shipped_kinematics_config_asks_for_files() -> None:
     [
         ("method=published", "allowed: source c3d with method published"),
         ("motion_cutoff=.nan", "finite number"),
+        ("motion_cutoff=6 Hz", "is '6 Hz', which is not a number in Hz; allowed: 1 to 50 Hz"),
         ("motion_cutof=6", "did you mean 'motion_cutoff'"),
         ("conditions=[]", "barefoot, orthosis"),
         ("source=c3d", "names no C3D file of barefoot or orthosis"),
@@ -327,7 +239,58 @@ def test_refused_configs(change: str, words: str) -> None:
 def test_unknown_trial_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "out"
     result = run(id_command, "inverse-dynamics", "--out", out, "--set", "trials=['42']")
-    assert "there is no trial 42" in refused(result, out)
+    assert "trials: there is no trial 42; allowed: 3053171, " in refused(result, out)
+
+
+BROKEN_TABLES: dict[str, tuple[str, Callable[[list[str]], list[str]], str]] = {
+    "few frames": ("angles", lambda lines: lines[:5], "has 4 rows; allowed: at least 20"),
+    "degrees": (
+        "angles",
+        lambda lines: [lines[0].replace("rad", "deg"), *lines[1:]],
+        r"has other columns; allowed: pelvis_tx \[m\], ",
+    ),
+    "fewer forces": ("forces", lambda lines: lines[:-9], "has 453 rows; allowed: 462, as many as"),
+    "another column": (
+        "forces",
+        lambda lines: [lines[0].replace("force_r_z", "fz"), *lines[1:]],
+        r"has other columns; allowed: force_r_x \[N\], force_r_z \[N\], ",
+    ),
+    "kilonewtons": (
+        "forces",
+        lambda lines: [lines[0].replace("[N]", "[kN]"), *lines[1:]],
+        "has other columns",
+    ),
+    "not text": ("events", lambda _: ["\udcff\udcfe"], "cannot be read: 'utf-8' codec"),
+}
+
+
+@pytest.mark.parametrize("fault", BROKEN_TABLES)
+def test_broken_recordings_of_a_patient_are_refused(fault: str, tmp_path: Path) -> None:
+    kind, broken, words = BROKEN_TABLES[fault]
+    shipped = load_patient(PATIENT).folder
+    assert shipped is not None
+    own, out = tmp_path / "patient", tmp_path / "out"
+    (own / "recordings" / "barefoot").mkdir(parents=True)
+    shutil.copy(shipped / "patient.yaml", own)
+    for path in (shipped / "recordings" / "barefoot").glob("3053179_*.csv"):
+        shutil.copy(path, own / "recordings" / "barefoot")
+    table = own / "recordings" / "barefoot" / f"3053179_{kind}.csv"
+    lines = broken(table.read_text(encoding="utf-8").splitlines())
+    table.write_text("\n".join(lines), encoding="utf-8", errors="surrogateescape")
+    changes = (f"patient={own}", "conditions=[barefoot]")
+    options = [word for change in changes for word in ("--set", change)]
+    message = refused(run(id_command, "inverse-dynamics", "--out", out, *options), out)
+    assert re.search(words, message), message
+    assert table.name in message
+
+
+@pytest.mark.parametrize("points", ["[]", "[{marker: LASI, link: pelvis, at: [0.06, 0.0]}]"])
+def test_a_marker_set_must_fix_all_coordinates(points: str, tmp_path: Path) -> None:
+    markers, out = tmp_path / "markers.yaml", tmp_path / "out"
+    markers.write_text(f"reference_height: 1.25\nboth: {points}\n", encoding="utf-8")
+    source = write_c3d(tmp_path / "walk.c3d")
+    message = refused(imported(source, out, "--markers", markers), out)
+    assert re.search("marker set: has [01] points for barefoot; allowed: at least 5", message)
 
 
 def test_dynamics_of_the_shipped_recordings(tmp_path: Path) -> None:
@@ -388,7 +351,7 @@ def test_figure_shows_only_measured_strides() -> None:
     figure = joint_torque_figure(trials, 24.7)
     labels = [entry.get_text() for entry in figure.legends[0].get_texts()]
     assert labels[:2] == ["right, mean of 4 measured strides", "left, mean of 5 measured strides"]
-    assert [ax.get_ylabel() for ax in figure.axes] == ["net torque [N m/kg]"] * 3
+    assert [ax.get_ylabel() for ax in figure.axes] == ["internal net torque [N m/kg]"] * 3
 
 
 def test_trials_without_forces_get_figures_of_angles_only(tmp_path: Path) -> None:

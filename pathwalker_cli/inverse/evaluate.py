@@ -5,27 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import COORDINATES, SUFFIX, Condition, Side, force_unit
+from pathwalker_cli.conventions import COORDINATES, SUFFIX, Condition, force_unit
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.cycles import GaitCycle, gait_cycles, stances
 from pathwalker_cli.inverse.direction import WalkingPlane
 from pathwalker_cli.inverse.dynamics import gait_torques
-from pathwalker_cli.inverse.forces import GroundForces, StanceForce
+from pathwalker_cli.inverse.filters import frame_rate
+from pathwalker_cli.inverse.forces import BOTH, GroundForces, force_columns
 from pathwalker_cli.inverse.gaps import Gap
 from pathwalker_cli.inverse.kinematics import MarkerResiduals
 from pathwalker_cli.inverse.markers import load_marker_set, marker_points
 from pathwalker_cli.inverse.process import ProcessedTrial, process_trial
-from pathwalker_cli.inverse.published import PublishedForces, published_torques
+from pathwalker_cli.inverse.published import published_torques
 from pathwalker_cli.inverse.published_tables import (
     AVERAGED_TRIALS,
     PublishedTrial,
     flagged_cycles,
 )
+from pathwalker_cli.inverse.stance_checks import StanceForce
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, RecordedConfig
 from pathwalker_cli.io.c3d import Event, Recording
 from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording, require_plates
@@ -35,7 +36,6 @@ from pathwalker_cli.patient import Patient
 from pathwalker_cli.trajectory import Trajectory
 
 __all__ = [
-    "BOTH",
     "Progress",
     "StudyTrial",
     "dynamics_trials",
@@ -45,10 +45,6 @@ __all__ = [
 
 Progress = Callable[[str], None]
 """Called with "barefoot 3053179" before a trial is evaluated."""
-
-BOTH: Final[tuple[Side, Side]] = ("right", "left")
-
-_COLUMNS: Final = (("force", "x"), ("force", "z"), ("cop", "x"))
 
 
 @dataclass(frozen=True)
@@ -117,6 +113,7 @@ def dynamics_trials(
     Raises:
         DataError: If there is no trial, a recording cannot be used, or no force is known.
     """
+    _require_trials(config, patient)
     trials: list[StudyTrial] = []
     for condition in config.conditions:
         if config.source == "c3d":
@@ -124,7 +121,6 @@ def dynamics_trials(
         else:
             found = _shipped_dynamics(config, patient, condition, progress)
         trials += found
-    _require_trials(trials, config, patient)
     _require_forces(trials)
     return tuple(trials)
 
@@ -213,6 +209,15 @@ def _with_torques(
     """Return a trial with its torques, if its forces are known."""
     if forces is None:
         return trial
+    highest = 0.5 * frame_rate(trial.motion)
+    if cutoff >= highest:
+        raise DataError(
+            f"motion_cutoff is {cutoff:g} Hz, but {2.0 * highest:g} frames per second show nothing "
+            f"from {highest:g} Hz on",
+            where=trial.name,
+            allowed=f"less than {highest:g} Hz",
+            mend="set motion_cutoff lower",
+        )
     model = pinocchio_model(patient, trial.condition)
     return replace(trial, tau=gait_torques(model, trial.motion, forces, cutoff))
 
@@ -225,17 +230,10 @@ def _published(trial: StudyTrial, recording: Recording, patient: Patient) -> Stu
     return replace(
         trial,
         cycles=flagged_cycles(recording),
-        forces=_published_columns(trial.motion.time, forces),
+        forces=force_columns(trial.motion.time, forces.force, forces.centre),
         tau=Trajectory(trial.motion.time, COORDINATES, tau, units),
         published=PublishedTrial(recording, trial.motion.values, tau),
     )
-
-
-def _published_columns(time: np.ndarray, forces: PublishedForces) -> Trajectory:
-    """Return the published method's forces in the columns of a recording."""
-    names = [f"{stem}_{SUFFIX[s]}_{axis}" for s in BOTH for stem, axis in _COLUMNS]
-    columns = [c for s in BOTH for c in (*forces.force[s].T, forces.centre[s])]
-    return Trajectory(time, tuple(names), np.stack(columns, axis=1), ("N", "N", "m") * 2)
 
 
 def _stances(recording: CompactRecording) -> tuple[StanceForce, ...]:
@@ -263,20 +261,24 @@ def _ground_forces(recording: CompactRecording, judged: tuple[StanceForce, ...])
     return GroundForces(columns.time, force, centre, judged, WalkingPlane(0, 1))
 
 
-def _require_trials(
-    trials: list[StudyTrial], config: InverseDynamicsConfig, patient: Patient
-) -> None:
+def _require_trials(config: InverseDynamicsConfig, patient: Patient) -> None:
     """Refuse a study without trials, or with names of trials that are not there."""
-    unknown = sorted(set(config.trials) - {trial.name for trial in trials})
-    if unknown:
-        names = ", ".join(trial.name for trial in trials) or "leave trials out to use all"
-        raise DataError(f"there is no trial {', '.join(unknown)}", where="trials", allowed=names)
-    if not trials:
+    there: list[str] = []
+    for condition in config.conditions:
+        if config.source == "c3d":
+            there += [path.stem for path in c3d_files(config.c3d.of(condition))]
+        else:
+            there += recording_names(patient, condition)
+    if not there:
         raise DataError(
             f"patient {patient.id} has no {' or '.join(config.conditions)} recordings",
             mend="import C3D files into recordings/<condition> beside the patient's file, or set "
             "source to c3d",
         )
+    unknown = sorted(set(config.trials) - set(there))
+    if unknown:
+        what = f"there is no trial {', '.join(unknown)}"
+        raise DataError(what, where="trials", allowed=", ".join(there))
 
 
 def _require_forces(trials: list[StudyTrial]) -> None:

@@ -10,7 +10,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["FORCE_CUTOFF", "MOTION_CUTOFF", "low_pass", "smooth_rates"]
+__all__ = ["FORCE_CUTOFF", "MOTION_CUTOFF", "frame_rate", "low_pass", "smooth_rates"]
 
 MOTION_CUTOFF: Final = 6.0
 """Cut-off of joint angles [Hz]; usual for walking (Winter 2009, section 3.4)."""
@@ -28,10 +28,15 @@ def low_pass(values: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
     Args:
         values: Samples, shape (n, ...).
         rate: Samples per second [1/s].
-        cutoff: Frequency at which half of the power passes each way [Hz].
+        cutoff: Frequency at which half of the power passes each way [Hz], below half of `rate`.
     """
     sections = butter(_ORDER, cutoff, fs=rate, output="sos")
     return np.asarray(sosfiltfilt(sections, values, axis=0))
+
+
+def frame_rate(motion: Trajectory) -> float:
+    """Return the frames per second of an evenly sampled motion [1/s]."""
+    return (motion.time.size - 1) / motion.duration
 
 
 def smooth_rates(
@@ -43,7 +48,6 @@ def smooth_rates(
         motion: Evenly sampled motion.
         cutoff: Cut-off frequency [Hz].
     """
-    rate = (motion.time.size - 1) / motion.duration
-    smooth = low_pass(motion.values, rate, cutoff)
+    smooth = low_pass(motion.values, frame_rate(motion), cutoff)
     spline = CubicSpline(motion.time, smooth, axis=0)
     return smooth, np.asarray(spline(motion.time, 1)), np.asarray(spline(motion.time, 2))

@@ -19,54 +19,31 @@ from pathwalker_cli.inverse.cycles import Stance, stances, swings
 from pathwalker_cli.inverse.direction import WalkingPlane
 from pathwalker_cli.inverse.filters import FORCE_CUTOFF, low_pass, smooth_rates
 from pathwalker_cli.inverse.plates import PlateLoad, centre_of_pressure, plate_load
-from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
+from pathwalker_cli.inverse.stance_checks import (
+    EDGE,
+    LOADED,
+    Evidence,
+    StanceForce,
+    judge,
+    outside,
+)
+from pathwalker_cli.io.c3d import ForcePlate, Recording
+from pathwalker_cli.io.recordings import FORCE_COLUMNS
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["GroundForces", "StanceForce", "foot_extents", "ground_forces", "plate_direction"]
+__all__ = [
+    "BOTH",
+    "GroundForces",
+    "foot_extents",
+    "force_columns",
+    "ground_forces",
+    "plate_direction",
+]
 
-LOADED: Final = 20.0
-"""Vertical force from which a plate counts as loaded [N]; about ten times its noise."""
-
-EDGE: Final = 3
-"""Frames by which force and event may differ at either end of a stance."""
-
-MARGIN: Final = 0.05
-"""Distance by which the centre of pressure may lie outside heel and toe [m]: shoes and markers."""
-
-INSIDE: Final = 0.9
-"""Share of a stance in which the centre of pressure must lie under the foot."""
-
-_BOTH: Final[tuple[Side, Side]] = ("right", "left")
+BOTH: Final[tuple[Side, Side]] = ("right", "left")
 
 _FAR: Final = 0.2
 """Distance beyond which it does not matter how far a load lies from a foot [m]."""
-
-PRESENT: Final = 0.4
-"""Peak force on a plate, as a share of what the body needs, from which a foot stood on it."""
-
-SUPPORT: Final = (0.85, 1.15)
-"""Mean vertical force in single support as a share of m (g + acceleration of the centre of mass):
-outside, part of the foot stood off the plate or something else stood on it."""
-
-
-@dataclass(frozen=True)
-class StanceForce:
-    """What the plates know about one stance.
-
-    Args:
-        stance: The stance.
-        plate: Index of the plate that carried it, or None.
-        reason: Why the stance is not measured, "" if it is.
-    """
-
-    stance: Stance
-    plate: int | None
-    reason: str
-
-    @property
-    def measured(self) -> bool:
-        """Whether the force of this stance is known."""
-        return not self.reason
 
 
 @dataclass(frozen=True)
@@ -88,14 +65,23 @@ class GroundForces:
     plane: WalkingPlane
 
     def trajectory(self) -> Trajectory:
-        """Return the forces as columns force_r_x, force_r_z, cop_r_x and the same on the left."""
-        names: list[str] = []
-        columns: list[np.ndarray] = []
-        for side in SIDES:
-            suffix = SUFFIX[side]
-            names += [f"force_{suffix}_x", f"force_{suffix}_z", f"cop_{suffix}_x"]
-            columns += [*self.force[side].T, self.centre[side]]
-        return Trajectory(self.time, tuple(names), np.stack(columns, axis=1), ("N", "N", "m") * 2)
+        """Return the forces as `FORCE_COLUMNS`."""
+        return force_columns(self.time, self.force, self.centre)
+
+
+def force_columns(
+    time: np.ndarray, force: Mapping[Side, np.ndarray], centre: Mapping[Side, np.ndarray]
+) -> Trajectory:
+    """Return forces as the columns force_r_x, force_r_z, cop_r_x and the same on the left.
+
+    Args:
+        time: Time of the frames [s], shape (n,).
+        force: Per side, force on the foot (forward, up) [N], shape (n, 2).
+        centre: Per side, forward position of the centre of pressure [m], shape (n,).
+    """
+    columns = [column for side in BOTH for column in (*force[side].T, centre[side])]
+    values = np.stack(columns, axis=1)
+    return Trajectory(time, tuple(FORCE_COLUMNS), values, tuple(FORCE_COLUMNS.values()))
 
 
 def ground_forces(
@@ -125,9 +111,11 @@ def ground_forces(
     found = stances(recording.events)
     plane = plane or plate_direction(loads, feet, found)
     up = np.stack([load.force[:, 2] for load in loads], axis=1)
-    points = [plane.project(centre_of_pressure(load, LOADED))[:, 0] for load in loads]
-    carried = _carried(model, motion)
-    judged = tuple(_judge(stance, recording.events, up, points, feet, carried) for stance in found)
+    points = np.stack(
+        [plane.project(centre_of_pressure(load, LOADED))[:, 0] for load in loads], axis=1
+    )
+    seen = Evidence(recording.events, up, points, feet, _carried(model, motion))
+    judged = tuple(judge(stance, seen) for stance in found)
     force, centre = _compose(recording, judged, [plane.project(x.force) for x in loads], points)
     return GroundForces(recording.time, force, centre, judged, plane)
 
@@ -165,7 +153,7 @@ def plate_direction(
     misses: list[tuple[float, WalkingPlane]] = []
     for plane in (WalkingPlane(axis, sign) for axis in (0, 1) for sign in (1, -1)):
         points = [plane.project(centre_of_pressure(load, 5.0 * LOADED))[:, 0] for load in loads]
-        gaps = np.array([[_outside(point, standing[side]) for side in SIDES] for point in points])
+        gaps = np.array([[outside(point, standing[side]) for side in SIDES] for point in points])
         nearest = np.fmin(gaps[:, 0], gaps[:, 1])
         seen = nearest[np.isfinite(nearest)]
         if seen.size:
@@ -184,40 +172,6 @@ def _load(plate: ForcePlate, recording: Recording, cutoff: float) -> PlateLoad:
     return plate_load(plate, smooth[::per_frame][: recording.positions.shape[0]])
 
 
-def _outside(points: np.ndarray, extents: np.ndarray) -> np.ndarray:
-    """Return by how much points lie behind the heel or before the toe [m], 0 if between."""
-    ends = np.sort(extents, axis=1)
-    return np.maximum(0.0, np.maximum(ends[:, 0] - points, points - ends[:, 1]))
-
-
-def _judge(
-    stance: Stance,
-    events: tuple[Event, ...],
-    up: np.ndarray,
-    points: list[np.ndarray],
-    feet: Mapping[Side, np.ndarray],
-    carried: np.ndarray,
-) -> StanceForce:
-    """Return the plate that carried a stance alone, or why there is none."""
-    rows = slice(stance.strike, stance.toe_off + 1)
-    plate = int(np.argmax(up[rows].sum(axis=0)))
-    load = up[:, plate]
-    if load[rows].max() < PRESENT * carried[rows].mean():
-        return StanceForce(stance, None, "no plate below the foot")
-    ends = [stance.strike - EDGE, stance.toe_off + EDGE]
-    if any(0 <= end < load.size and load[end] > LOADED for end in ends):
-        return StanceForce(stance, plate, f"plate {plate + 1} loaded before or after the stance")
-    gap = _outside(points[plate][rows], feet[stance.side][rows])
-    if np.mean(gap[np.isfinite(gap)] < MARGIN) < INSIDE:
-        return StanceForce(stance, plate, f"plate {plate + 1}: load not under the foot")
-    single = _single_support(stance, events)
-    share = float(load[single].mean() / carried[single].mean()) if single.size else 0.0
-    if not SUPPORT[0] < share < SUPPORT[1]:
-        reason = f"plate {plate + 1} carries {share:.0%} of the body in single support"
-        return StanceForce(stance, plate, reason)
-    return StanceForce(stance, plate, "")
-
-
 def _carried(model: pin.Model, motion: Trajectory) -> np.ndarray:
     """Return the vertical force that the motion of the centre of mass takes [N], shape (n,)."""
     data: Any = model.createData()
@@ -229,25 +183,17 @@ def _carried(model: pin.Model, motion: Trajectory) -> np.ndarray:
     return pin.computeTotalMass(model) * (GRAVITY + up)
 
 
-def _single_support(stance: Stance, events: tuple[Event, ...]) -> np.ndarray:
-    """Return the frames of a stance in which the other foot is in the air."""
-    frames = np.arange(stance.strike, stance.toe_off + 1)
-    other: Side = "left" if stance.side == "right" else "right"
-    alone = [(frames > off) & (frames < strike) for off, strike in swings(events, other)]
-    return frames[np.any(alone, axis=0)] if alone else frames[:0]
-
-
 def _compose(
     recording: Recording,
     judged: tuple[StanceForce, ...],
     forces: list[np.ndarray],
-    points: list[np.ndarray],
+    points: np.ndarray,
 ) -> tuple[dict[Side, np.ndarray], dict[Side, np.ndarray]]:
     """Return force and centre of pressure per side from measured stances and swings."""
     frames = recording.positions.shape[0]
     force: dict[Side, np.ndarray] = {}
     centre: dict[Side, np.ndarray] = {}
-    for side in _BOTH:
+    for side in BOTH:
         force[side] = np.full((frames, 2), np.nan)
         centre[side] = np.full(frames, np.nan)
         for off, strike in swings(recording.events, side):
@@ -257,7 +203,7 @@ def _compose(
             continue
         side, plate = item.stance.side, item.plate
         rows = np.arange(max(item.stance.strike - EDGE, 0), min(item.stance.toe_off + EDGE, frames))
-        loaded = np.isfinite(points[plate][rows])
+        loaded = np.isfinite(points[rows, plate])
         force[side][rows] = np.where(loaded[:, None], forces[plate][rows], 0.0)
-        centre[side][rows] = points[plate][rows]
+        centre[side][rows] = points[rows, plate]
     return force, centre

@@ -8,7 +8,7 @@ from typing import Annotated, Final
 
 from pydantic import model_validator
 
-from pathwalker_cli.conventions import Condition
+from pathwalker_cli.conventions import COORDINATES, Condition
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.io.yaml_file import load_yaml
@@ -87,10 +87,21 @@ def load_marker_set(path: str | Path | None = None) -> MarkerSet:
 def marker_points(
     marker_set: MarkerSet, patient: Patient, condition: Condition
 ) -> tuple[MarkerPoint, ...]:
-    """Return the points of a patient's walker that the markers were attached to."""
+    """Return the points of a patient's walker that the markers were attached to.
+
+    Raises:
+        ConfigError: If they are too few to fix all coordinates.
+    """
     lengths = {segment.name: segment.length for segment in segments(patient, "barefoot")}
     scale = patient.height / marker_set.reference_height
     entries = [*marker_set.both, *getattr(marker_set, condition)]
+    if 2 * len(entries) < len(COORDINATES):
+        raise ConfigError(
+            f"has {len(entries)} points for {condition}",
+            where="marker set",
+            allowed=f"at least {len(COORDINATES) // 2}, which fix {len(COORDINATES)} coordinates",
+            mend=f"name the markers below both or {condition}",
+        )
     return tuple(
         MarkerPoint(entry.marker, entry.link, _position(entry, lengths, scale), entry.weight)
         for entry in entries

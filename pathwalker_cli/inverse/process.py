@@ -10,11 +10,12 @@ import pinocchio as pin
 from pathwalker_cli.conventions import Condition, velocity_unit
 from pathwalker_cli.inverse.direction import is_projected, walking_plane
 from pathwalker_cli.inverse.dynamics import gait_torques
-from pathwalker_cli.inverse.filters import smooth_rates
+from pathwalker_cli.inverse.filters import MOTION_CUTOFF, smooth_rates
 from pathwalker_cli.inverse.forces import GroundForces, ground_forces
 from pathwalker_cli.inverse.gaps import LONGEST_GAP, Gap, bridge_gaps
 from pathwalker_cli.inverse.kinematics import MarkerResiduals, inverse_kinematics, pelvis_markers
 from pathwalker_cli.inverse.markers import MarkerSet, load_marker_set, marker_points
+from pathwalker_cli.inverse.stance_checks import StanceForce
 from pathwalker_cli.io.c3d import Event, read_c3d
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
@@ -46,6 +47,11 @@ class ProcessedTrial:
     events: tuple[Event, ...]
     forces: GroundForces | None
     tau: Trajectory | None
+
+    @property
+    def stances(self) -> tuple[StanceForce, ...]:
+        """What the plates know about every stance."""
+        return self.forces.stances if self.forces else ()
 
 
 def process_trial(
@@ -82,8 +88,15 @@ def process_trial(
     )
 
 
-def smooth_motion(motion: Trajectory) -> tuple[Trajectory, Trajectory]:
-    """Return filtered coordinates and their rates."""
-    q, v, _ = smooth_rates(motion)
+def smooth_motion(
+    motion: Trajectory, cutoff: float = MOTION_CUTOFF
+) -> tuple[Trajectory, Trajectory]:
+    """Return filtered coordinates and their rates.
+
+    Args:
+        motion: Coordinates in every frame [m, rad].
+        cutoff: Cut-off frequency [Hz].
+    """
+    q, v, _ = smooth_rates(motion, cutoff)
     units = tuple(velocity_unit(name) for name in motion.names)
     return replace(motion, values=q), replace(motion, values=v, units=units)

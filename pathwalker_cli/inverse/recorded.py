@@ -10,6 +10,7 @@ import pinocchio as pin
 from pathwalker_cli.conventions import Condition, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.cycles import gait_cycles, joint_ranges, step_lengths, walking_speed
+from pathwalker_cli.inverse.filters import frame_rate
 from pathwalker_cli.inverse.forces import foot_extents
 from pathwalker_cli.io.recordings import CompactRecording
 from pathwalker_cli.model.urdf import pinocchio_model
@@ -65,14 +66,10 @@ def _steps(model: pin.Model, trials: Sequence[CompactRecording]) -> dict[Side, l
         heels = {
             side: ends[:, 0] for side, ends in foot_extents(model, trial.motion.values).items()
         }
-        for side, lengths in step_lengths(trial.events, heels, _rate(trial)).items():
+        rate = frame_rate(trial.motion)
+        for side, lengths in step_lengths(trial.events, heels, rate).items():
             steps[side] += lengths
     return steps
-
-
-def _rate(trial: CompactRecording) -> float:
-    """Return the frames per second of a trial [1/s]."""
-    return (trial.motion.time.size - 1) / trial.motion.duration
 
 
 def _rounded(value: float | np.floating) -> float:

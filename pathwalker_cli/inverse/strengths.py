@@ -14,20 +14,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
 from pathwalker_cli.conventions import LEG_JOINTS, SIDES, SUFFIX
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.bands import resampled
-from pathwalker_cli.inverse.process import ProcessedTrial, smooth_motion
+from pathwalker_cli.inverse.filters import MOTION_CUTOFF
+from pathwalker_cli.inverse.process import smooth_motion
+from pathwalker_cli.inverse.stance_checks import StanceForce
 from pathwalker_cli.io.fields import Sides
 from pathwalker_cli.model.muscle import MuscleTorqueGenerator, curves_of, generators
 from pathwalker_cli.patient_blocks import Strengths
+from pathwalker_cli.trajectory import Trajectory
 
 __all__ = [
     "ACTIVATION_AT_PEAK",
+    "MeasuredTrial",
     "Peak",
     "extension_peaks",
     "isometric_torque",
@@ -38,6 +42,22 @@ __all__ = [
 
 ACTIVATION_AT_PEAK: Final = 0.9
 """Activation at the peak of the torque, article, section 2.2.1."""
+
+
+class MeasuredTrial(Protocol):
+    """A trial with torques, whatever else is known about it."""
+
+    @property
+    def motion(self) -> Trajectory:
+        """Coordinates in every frame, unfiltered [m, rad]."""
+
+    @property
+    def tau(self) -> Trajectory | None:
+        """Generalised forces [N, N m], NaN where not measured, or None."""
+
+    @property
+    def stances(self) -> tuple[StanceForce, ...]:
+        """What the plates know about every stance."""
 
 
 @dataclass(frozen=True)
@@ -76,28 +96,30 @@ def isometric_torque(
     return torque / (ACTIVATION_AT_PEAK * factor)
 
 
-def stance_curves(trials: Sequence[ProcessedTrial]) -> dict[str, list[np.ndarray]]:
+def stance_curves(
+    trials: Sequence[MeasuredTrial], cutoff: float = MOTION_CUTOFF
+) -> dict[str, list[np.ndarray]]:
     """Return torque, angle and speed of every leg joint over every measured stance.
 
     Args:
         trials: Trials without an orthosis, whose torque would add to the muscles'.
+        cutoff: Cut-off frequency of the motion [Hz], that of the torques.
 
     Returns:
         Per coordinate, arrays of shape (POINTS, 3): torque [N m], angle [rad], speed [rad/s].
     """
     curves: dict[str, list[np.ndarray]] = {}
     for trial in trials:
-        if trial.forces is None or trial.tau is None:
+        if trial.tau is None:
             continue
-        q, v = smooth_motion(trial.motion)
-        for item in trial.forces.stances:
-            if not item.measured:
-                continue
+        parts = (trial.tau, *smooth_motion(trial.motion, cutoff))
+        for item in trial.stances:
             rows = slice(item.stance.strike, item.stance.toe_off + 1)
             for joint in LEG_JOINTS:
                 name = f"{joint}_{SUFFIX[item.stance.side]}"
-                columns = np.stack([part[name][rows] for part in (trial.tau, q, v)], axis=1)
-                curves.setdefault(name, []).append(resampled(columns))
+                columns = np.stack([part[name][rows] for part in parts], axis=1)
+                if item.measured and np.isfinite(columns).all():
+                    curves.setdefault(name, []).append(resampled(columns))
     return curves
 
 
@@ -121,16 +143,17 @@ def extension_peaks(means: Mapping[str, np.ndarray], counts: Mapping[str, int]) 
     return tuple(peaks)
 
 
-def strengths(trials: Sequence[ProcessedTrial]) -> Strengths:
+def strengths(trials: Sequence[MeasuredTrial], cutoff: float = MOTION_CUTOFF) -> Strengths:
     """Return all strengths [N m] from the mean torque of each joint over its measured stances.
 
     Args:
         trials: Trials without an orthosis.
+        cutoff: Cut-off frequency of the motion [Hz], that of the torques.
 
     Raises:
         DataError: If a joint has no measured stance.
     """
-    curves = stance_curves(trials)
+    curves = stance_curves(trials, cutoff)
     means = {name: np.mean(found, axis=0) for name, found in curves.items()}
     counts = {name: len(found) for name, found in curves.items()}
     return strengths_of(extension_peaks(means, counts))

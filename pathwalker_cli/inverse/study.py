@@ -142,23 +142,28 @@ def load_inverse_dynamics(path: str | Path, changes: tuple[str, ...] = ()) -> In
 
 
 def _load(path: str | Path, changes: tuple[str, ...], model_class: type[Config]) -> Config:
-    """Read a config; its paths are relative to its own folder where something is there."""
+    """Read a config; its paths count from its own folder, those of overrides from here."""
     source = find_config(Path(path))
     mapping, lines = read_mapping(source, ConfigError)
     for change in changes:
         apply_change(mapping, change)
     config = validate(mapping, model_class, where=str(path), error=ConfigError, lines=lines)
-    beside = source.parent
-    paths = {c: tuple(_placed(p, beside) for p in config.c3d.of(c)) for c in config.conditions}
+    overridden = {change.partition("=")[0].strip() for change in changes}
+
+    def placed(file: str, key: str) -> str:
+        folders = (source.parent, Path())
+        if key in overridden:
+            folders = folders[::-1]
+        found = (folder / file for folder in folders if (folder / file).exists())
+        return str(next(found, file))
+
+    paths = {
+        condition: tuple(placed(file, f"c3d.{condition}") for file in config.c3d.of(condition))
+        for condition in config.conditions
+    }
     changed = {
         "patient": patient_path(config.patient, source),
         "c3d": Paths(**paths),
-        "markers": _placed(config.markers, beside) if config.markers else None,
+        "markers": placed(config.markers, "markers") if config.markers else None,
     }
     return config.model_copy(update=changed)
-
-
-def _placed(path: str, beside: Path) -> str:
-    """Return a path beside the config if something is there, else the path as it is."""
-    candidate = beside / path
-    return str(candidate) if candidate.exists() else path

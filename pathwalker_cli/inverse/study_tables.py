@@ -9,12 +9,11 @@ from typing import Final, Literal
 import numpy as np
 from pydantic import ValidationError
 
-from pathwalker_cli.conventions import GENERATORS, GRAVITY, LEG_JOINTS, SUFFIX, Condition, Side
+from pathwalker_cli.conventions import GENERATORS, GRAVITY, Condition, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.bands import resampled
 from pathwalker_cli.inverse.cycles import stances, swings
-from pathwalker_cli.inverse.evaluate import BOTH, StudyTrial
-from pathwalker_cli.inverse.filters import smooth_rates
+from pathwalker_cli.inverse.evaluate import StudyTrial
+from pathwalker_cli.inverse.forces import BOTH
 from pathwalker_cli.inverse.published import EVENT_SHIFT
 from pathwalker_cli.inverse.published_tables import published_residuals, published_strengths
 from pathwalker_cli.inverse.residuals import ResidualRange, Residuals, residual_range, residuals
@@ -22,6 +21,7 @@ from pathwalker_cli.inverse.strengths import (
     Peak,
     extension_peaks,
     isometric_torque,
+    stance_curves,
     strengths_of,
 )
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
@@ -228,7 +228,7 @@ def _peaks(
             for peak in published_strengths((one,)):
                 single.setdefault(peak.generator, []).append(peak.strength)
         return published_strengths(published), single
-    curves = _stance_curves(trials, cutoff)
+    curves = stance_curves(trials, cutoff)
     for name, found in curves.items():
         for curve in found:
             for peak in extension_peaks({name: curve}, {name: 1}):
@@ -237,29 +237,11 @@ def _peaks(
     return extension_peaks(means, {name: len(found) for name, found in curves.items()}), single
 
 
-def _stance_curves(trials: Sequence[StudyTrial], cutoff: float) -> dict[str, list[np.ndarray]]:
-    """Return torque, angle and speed, shape (POINTS, 3), of every joint over measured stances."""
-    curves: dict[str, list[np.ndarray]] = {}
-    for trial in trials:
-        if trial.tau is None:
-            continue
-        q, v, _ = smooth_rates(trial.motion, cutoff)
-        for item in trial.stances:
-            rows = slice(item.stance.strike, item.stance.toe_off + 1)
-            for joint in LEG_JOINTS:
-                name = f"{joint}_{SUFFIX[item.stance.side]}"
-                column = trial.motion.names.index(name)
-                parts = [values[rows, column] for values in (trial.tau.values, q, v)]
-                if item.measured and np.isfinite(parts[0]).all():
-                    curves.setdefault(name, []).append(resampled(np.stack(parts, axis=1)))
-    return curves
-
-
 def _origin(generator: str) -> str:
     """Return where a strength without a peak of its own comes from."""
     if generator == "lumbar_extension":
         return "mean of both hips"
-    return "from extension by the ratio of healthy adults"
+    return "ratio to extension"
 
 
 def _remark(peak: Peak, low: float, high: float, config: InverseDynamicsConfig) -> str:

@@ -15,9 +15,20 @@ import numpy as np
 from pathwalker_cli.conventions import Side
 from pathwalker_cli.errors import DataError
 
-__all__ = ["Event", "EventKind", "ForcePlate", "Recording", "analog_offset_error", "read_c3d"]
+__all__ = [
+    "LEAST_FRAMES",
+    "Event",
+    "EventKind",
+    "ForcePlate",
+    "Recording",
+    "analog_offset_error",
+    "read_c3d",
+]
 
 EventKind = Literal["foot_strike", "toe_off"]
+
+LEAST_FRAMES: Final = 20
+"""Frames that the zero-lag filter needs at the ends, and fewer than any step has."""
 
 _METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _KINDS: Final[dict[str, EventKind]] = {"foot strike": "foot_strike", "foot off": "toe_off"}
@@ -179,8 +190,8 @@ def _events(parameters: Any, rate: float, first_frame: int, frames: int) -> tupl
     """Return strikes and toe-offs inside the recording; other events are left out.
 
     C3D counts event times from frame 1 at time zero; an event between two frames counts for the
-    later one.  In the shipped recordings the plates' forces
-    rise and fall within one frame of the events read this way.
+    later one.  In the shipped recordings the plates' forces rise and fall within one frame of the
+    events read this way.
     """
     group = parameters.get("EVENT", {})
     if "TIMES" not in group or not np.size(group["TIMES"]["value"]):

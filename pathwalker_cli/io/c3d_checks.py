@@ -10,12 +10,12 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.io.c3d import Recording, read_c3d
+from pathwalker_cli.io.c3d import LEAST_FRAMES, Recording, read_c3d
 
 __all__ = ["c3d_files", "checked_recording", "require_plates"]
 
-LEAST_FRAMES: Final = 20
-"""Frames that the zero-lag filter needs at the ends, and fewer than any step has."""
+LEAST_RATE: Final = 50.0
+"""Frames per second below which foot strikes blur [1/s]; the plates' 20 Hz filter needs 40."""
 
 SPAN: Final = (0.25, 4.0)
 """Height of the markers over the floor's lowest one as a share of the body's height: a person is
@@ -126,8 +126,13 @@ def _check_length(path: Path) -> None:
 def _check_frames(recording: Recording, path: Path) -> None:
     """Refuse a recording that is no motion."""
     frames = recording.positions.shape[0]
-    if not (np.isfinite(recording.rate) and recording.rate > 0.0):
-        raise DataError(f"has {recording.rate:g} frames per second", where=str(path))
+    if not (np.isfinite(recording.rate) and recording.rate >= LEAST_RATE):
+        raise DataError(
+            f"has {recording.rate:g} frames per second",
+            where=str(path),
+            allowed=f"at least {LEAST_RATE:g}",
+            mend="if it was recorded faster, correct POINT:RATE",
+        )
     if frames < LEAST_FRAMES:
         raise DataError(
             f"has {frames} frame{'s' if frames != 1 else ''}",
@@ -178,8 +183,16 @@ def _check_unit(recording: Recording, markers: Sequence[str], height: float, pat
 
 
 def _check_signals(recording: Recording, path: Path) -> None:
-    """Refuse a recording whose force plates hold something else than numbers."""
+    """Refuse a recording whose force plates have no extent or hold something else than numbers."""
     for plate in recording.plates:
+        sides = np.diff(plate.corners, axis=0)[:2]
+        if not (np.linalg.norm(np.cross(*sides)) > 0.0 and plate.half_length * plate.half_width):
+            raise DataError(
+                f"{plate.name} has no extent",
+                where=str(path),
+                allowed="four corners, and distances of the sensors from the centre",
+                mend="set FORCE_PLATFORM:CORNERS and ORIGIN and export again",
+            )
         bad = np.flatnonzero(~np.isfinite(plate.channels).all(axis=1))
         if bad.size:
             raise DataError(

@@ -3,18 +3,36 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from pathwalker_cli.conventions import COORDINATES, Condition, coordinate_unit
+from pathwalker_cli.conventions import COORDINATES, SUFFIX, Condition, Side, coordinate_unit
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.io.c3d import Event
+from pathwalker_cli.io.c3d import LEAST_FRAMES, Event
 from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["CompactRecording", "read_recording", "recording_names", "write_recording"]
+__all__ = [
+    "FORCE_COLUMNS",
+    "CompactRecording",
+    "read_recording",
+    "recording_names",
+    "write_recording",
+]
+
+_BOTH: Final[tuple[Side, Side]] = ("right", "left")
+
+FORCE_COLUMNS: Final = {
+    f"{stem}_{SUFFIX[side]}_{axis}": unit
+    for side in _BOTH
+    for stem, axis, unit in (("force", "x", "N"), ("force", "z", "N"), ("cop", "x", "m"))
+}
+"""Columns of a table of ground forces with their units: right foot, then left."""
+
+_ANGLE_COLUMNS: Final = {name: coordinate_unit(name) for name in COORDINATES}
 
 _EVENT_COLUMNS: Final = ["side", "event", "frame", "time [s]"]
 
@@ -73,18 +91,32 @@ def read_recording(patient: Patient, condition: Condition, name: str) -> Compact
             mend="import C3D files first",
         )
     stem = _folder(patient, condition) / name
-    motion = read_trajectory(f"{stem}_angles.csv")
-    expected = tuple((column, coordinate_unit(column)) for column in COORDINATES)
-    if tuple(zip(motion.names, motion.units, strict=True)) != expected:
-        allowed = ", ".join(f"{column} [{unit}]" for column, unit in expected)
-        raise DataError("has other columns", where=f"{stem}_angles.csv", allowed=allowed)
-    forces = Path(f"{stem}_forces.csv")
-    return CompactRecording(
-        name=name,
-        motion=motion,
-        events=_read_events(Path(f"{stem}_events.csv"), motion.time.size),
-        forces=read_trajectory(forces, missing=True) if forces.is_file() else None,
-    )
+    motion = _read_table(Path(f"{stem}_angles.csv"), _ANGLE_COLUMNS)
+    frames = motion.time.size
+    if frames < LEAST_FRAMES:
+        raise DataError(
+            f"has {frames} rows", where=f"{stem}_angles.csv", allowed=f"at least {LEAST_FRAMES}"
+        )
+    path = Path(f"{stem}_forces.csv")
+    forces = _read_table(path, FORCE_COLUMNS, missing=True) if path.is_file() else None
+    if forces is not None and forces.time.size != frames:
+        raise DataError(
+            f"has {forces.time.size} rows",
+            where=str(path),
+            allowed=f"{frames}, as many as {name}_angles.csv",
+            mend="import the recording again",
+        )
+    events = _read_events(Path(f"{stem}_events.csv"), frames)
+    return CompactRecording(name, motion, events, forces)
+
+
+def _read_table(path: Path, columns: Mapping[str, str], missing: bool = False) -> Trajectory:
+    """Read a table that must have these columns in these units."""
+    table = read_trajectory(path, missing)
+    if dict(zip(table.names, table.units, strict=True)) != columns or table.names != (*columns,):
+        allowed = ", ".join(f"{column} [{unit}]" for column, unit in columns.items())
+        raise DataError("has other columns", where=str(path), allowed=allowed)
+    return table
 
 
 def _folder(patient: Patient, condition: Condition) -> Path:
@@ -96,10 +128,14 @@ def _folder(patient: Patient, condition: Condition) -> Path:
 
 def _read_events(path: Path, frames: int) -> tuple[Event, ...]:
     """Return the events in a file."""
-    if not path.is_file():
-        raise DataError("no such file", where=str(path), mend="import the recording again")
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
+    mend = "import the recording again"
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.reader(file))
+    except FileNotFoundError:
+        raise DataError("no such file", where=str(path), mend=mend) from None
+    except (OSError, UnicodeDecodeError, csv.Error) as problem:
+        raise DataError(f"cannot be read: {problem}", where=str(path), mend=mend) from None
     if not rows or rows[0] != _EVENT_COLUMNS:
         raise DataError(
             "has another header", where=f"{path}, row 1", allowed=",".join(_EVENT_COLUMNS)

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -27,6 +28,7 @@ from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
     NEUTRAL,
+    NORMAL,
     PAGE,
     STYLE,
     dress,
@@ -109,7 +111,7 @@ def joint_torque_figure(trials: Sequence[StudyTrial], body_mass: float) -> Figur
     fig = new_figure(PAGE, 2.6)
     for ax, (joint, title) in zip(fig.subplots(1, 3), _TORQUES.items(), strict=True):
         factor = EXTENSION[joint] / body_mass
-        _panel(ax, bands, f"{joint}_{{}}", factor, title, "net torque [N m/kg]")
+        _panel(ax, bands, f"{joint}_{{}}", factor, title, "internal net torque [N m/kg]")
     legend(fig, _handles(bands, "hip_{}", measured=True))
     return fig
 
@@ -187,12 +189,21 @@ def save_recorded_figures(
     with mpl.rc_context(STYLE):
         for name, maker in makers.items():
             figure = maker()
+            _head(figure, _counted(f"{trials[0].condition},", len(trials), "trial"))
             for extension in formats:
                 names.append(f"{name}.{extension}")
                 metadata = {"Software": None} if extension == "png" else {"Date": None}
                 with atomic_path(Path(folder) / names[-1]) as temporary:
                     figure.savefig(temporary, format=extension, dpi=DPI, metadata=metadata)
     return tuple(names)
+
+
+def _head(figure: Figure, words: str) -> None:
+    """Put words above the legend of a figure, so that it tells what it shows wherever it goes."""
+    inside = [box for ax in figure.axes if (box := ax.get_legend())]
+    for box in [*figure.legends, *inside]:
+        box.set_title(words, prop=FontProperties(size=NORMAL, weight="bold"))
+        box.set_alignment("left")
 
 
 def _bands(
@@ -261,6 +272,8 @@ def _panel(ax: Axes, bands: _Bands, pattern: str, factor: float, title: str, lab
         )
         colour, style = LINE_COLOUR[side], LINE_STYLE[side]
         ax.fill_between(percent, low, high, color=colour, alpha=0.18, linewidth=0)
+        for edge in (low, high):  # so that the ranges of both sides differ without colour too
+            ax.plot(percent, edge, color=colour, linestyle=style, linewidth=0.5, alpha=0.7)
         ax.plot(percent, mean, color=colour, linestyle=style)
         ax.axvline(bands.toe_off[side], linewidth=0.6, color=colour, linestyle=style)
     percent_axis(ax)

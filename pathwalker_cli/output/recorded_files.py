@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import Condition
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.inverse.study_tables import ResidualTable, StrengthTable
@@ -23,7 +22,6 @@ from pathwalker_cli.io.trajectory_csv import write_trajectory
 from pathwalker_cli.patient_blocks import Strengths
 
 __all__ = [
-    "by_condition",
     "staged_folder",
     "write_marker_table",
     "write_residuals",
@@ -190,14 +188,6 @@ def write_strengths_yaml(path: Path, strengths: Strengths, source: str) -> None:
             shown = f"{value:.4f}"
         lines.append(f"  {name}: {shown}")
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def by_condition(trials: Iterable[StudyTrial]) -> dict[Condition, list[StudyTrial]]:
-    """Return the trials of each condition."""
-    found: dict[Condition, list[StudyTrial]] = {}
-    for trial in trials:
-        found.setdefault(trial.condition, []).append(trial)
-    return found
 
 
 def _write(path: Path, header: list[str], rows: Iterable[Sequence[object]]) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from rich.console import RenderableType
 from rich.table import Table
+from rich.text import Text
 
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.inverse.study_tables import ResidualTable, StrengthTable
@@ -21,48 +23,56 @@ __all__ = [
 
 def trials_renderable(trials: Iterable[StudyTrial]) -> Table:
     """Return one row per trial: length, cycles, measured stances, distance of the markers."""
+    trials = tuple(trials)
+    fitted = any(trial.markers for trial in trials)
     table = Table(title="Trials", title_justify="left")
-    for name in ("condition", "trial", "frames", "strides", "measured stances", "markers [mm]"):
-        table.add_column(name, justify="left" if name in ("condition", "trial") else "right")
+    for name in ("condition", "trial"):
+        table.add_column(name)
+    for name in ("frames", "strides", "measured stances", *["markers\n[mm]"] * fitted):
+        table.add_column(name, justify="right")
     for trial in trials:
         seen = [item.stance.side for item in trial.stances if item.measured]
         counts = [f"{seen.count(side)} {side}" for side in ("right", "left") if side in seen]
-        distance = f"{1e3 * trial.markers.mean:.1f}" if trial.markers else "-"
-        table.add_row(trial.condition, trial.name, str(trial.motion.time.size),
-                      str(len(trial.cycles)), ", ".join(counts) or "-", distance)  # fmt: skip
+        row = [trial.condition, trial.name, str(trial.motion.time.size), str(len(trial.cycles)),
+               ", ".join(counts) or "-"]  # fmt: skip
+        if fitted:
+            row.append(f"{1e3 * trial.markers.mean:.1f}" if trial.markers else "-")
+        table.add_row(*row)
     return table
 
 
 def residuals_renderable(tables: Sequence[ResidualTable]) -> Table:
-    """Return mean residuals per trial and over trials, in N and N m and per kg."""
+    """Return mean residuals per trial and over trials, these also per kg of body mass."""
     table = Table(title="Pelvis residuals, means over frames", title_justify="left")
-    for name in ("condition", "part", "trial", "frames"):
-        table.add_column(name, justify="right" if name == "frames" else "left")
-    for name in ("forward\n[N]", "up\n[N]", "moment\n[N m]"):
+    table.add_column("trials and parts of the cycle", no_wrap=True)
+    for name in ("frames", "forward\n[N]", "up\n[N]", "moment\n[N m]"):
         table.add_column(name, justify="right")
-    for name in ("forward\n[N/kg]", "up\n[N/kg]", "moment\n[N m/kg]"):
-        table.add_column(name, justify="right", style="dim")
     for block in tables:
+        table.add_row(f"{block.condition}, {block.part}", style="bold")
         for item in block.trials:
-            table.add_row(block.condition, block.part, item.trial, str(item.frames),
-                          *_values(item.mean, block.body_mass))  # fmt: skip
+            table.add_row(f"  {item.trial}", str(item.frames), *_values(item.mean, 2))
         if block.range is not None:
             found = block.range
-            spans = (("mean", found.mean), ("min", found.lowest), ("max", found.highest))
-            for name, values in spans:
-                table.add_row(block.condition, block.part, name, "",
-                              *_values(values, block.body_mass), style="bold",
-                              end_section=name == "max")  # fmt: skip
+            spans = {"mean": found.mean, "min": found.lowest, "max": found.highest}
+            for name, values in spans.items():
+                table.add_row(f"  {name} over trials", "", *_values(values, 2), style="bold")
+            for name, values in spans.items():
+                per_kg = _values(values / block.body_mass, 3)
+                table.add_row(f"  {name} per kg of body mass", "", *per_kg, style="dim")
+        table.add_section()
     return table
 
 
-def strengths_renderable(found: StrengthTable) -> Table:
-    """Return all strengths beside those of the patient's file."""
-    table = Table(title="Strengths at 90 % activation", title_justify="left")
-    columns = {"generator": "left", "here\n[N m]": "right", "patient\nfile [N m]": "right",
-               "deviation": "right", "stances": "right", "remark": "left"}  # fmt: skip
-    for name, justify in columns.items():
-        table.add_column(name, justify="right" if justify == "right" else "left")
+def strengths_renderable(found: StrengthTable) -> RenderableType:
+    """Return all strengths beside those of the patient's file, or why there are none."""
+    if not found.rows:
+        return Text(f"No strengths: {found.reason}.")
+    title = "Strengths at 90 % activation, beside the patient's file"
+    table = Table(title=title, title_justify="left")
+    table.add_column("generator", no_wrap=True)
+    for name in ("here\n[N m]", "patient\n[N m]", "off by", "stances"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("remark")
     for row in found.rows:
         table.add_row(
             row.generator,
@@ -107,13 +117,14 @@ def trial_warnings(trials: Iterable[StudyTrial], height: float, share: float) ->
 def stance_notes(trials: Iterable[StudyTrial]) -> tuple[str, ...]:
     """Return a sentence for every stance that a plate felt but that is not measured."""
     return tuple(
-        f"{trial.name}: {item.stance.side} stance from frame {item.stance.strike}: {item.reason}"
+        f"{trial.name}: {item.stance.side} stance from frame {item.stance.strike} is not measured: "
+        f"{item.reason}"
         for trial in trials
         for item in trial.stances
         if not item.measured and item.plate is not None
     )
 
 
-def _values(mean: np.ndarray, mass: float) -> list[str]:
-    """Return three values and the same per kg as text."""
-    return [f"{x:.2f}" for x in mean] + [f"{x:.3f}" for x in mean / mass]
+def _values(mean: np.ndarray, digits: int) -> list[str]:
+    """Return forward, up and moment as text."""
+    return [f"{x:.{digits}f}" for x in mean]
