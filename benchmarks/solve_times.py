@@ -12,7 +12,8 @@ import resource
 import time
 
 from pathwalker_cli.config import load_config
-from pathwalker_cli.ocp.solve import GaitSolution, GaitSolver
+from pathwalker_cli.ocp.solution import GaitSolution
+from pathwalker_cli.ocp.solve import GaitSolver
 
 
 def cpu_seconds() -> float:

@@ -100,6 +100,7 @@ class BoundsConfig(YamlModel):
     plantarflexion_stiffness: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE] | None = None
     friction: Annotated[float, Quantity("", 0.05, 2.0)] = 0.8
     least_vertical_force: Annotated[float, Quantity("N", 0.0, 50.0)] = 0.0
+    least_height: Annotated[float, Quantity("m", -0.02, 0.0)] = -1e-3
 
     @field_validator("joint_ranges", "fallback_joint_ranges")
     @classmethod
@@ -131,9 +132,11 @@ class MeshConfig(YamlModel):
     """Mesh intervals and the accuracy that they must reach."""
 
     degree: Annotated[int, Field(ge=2, le=6)] = 3
-    start_intervals_per_phase: Annotated[int, Field(ge=2, le=50)] = 4
-    intervals: Annotated[int, Field(ge=0, le=1000)] = 80
-    least_intervals_per_phase: Annotated[int, Field(ge=1, le=50)] = 5
+    intervals: (
+        Annotated[int, Field(ge=8, le=1000)]
+        | Annotated[tuple[Annotated[int, Field(ge=1, le=200)], ...], AS_TUPLE]
+    ) = 32
+    least_intervals_per_phase: Annotated[int, Field(ge=1, le=50)] = 2
     position_tolerance: Annotated[float, Quantity("rad or m", 1e-8, 1.0)] = 1e-3
     velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2
     refinements: Annotated[int, Field(ge=0, le=20)] = 8
@@ -153,11 +156,12 @@ class SolverConfig(YamlModel):
     """Tolerances and limits of the nonlinear solver."""
 
     tolerance: Annotated[float, Quantity("", 1e-12, 1e-1)] = 1e-6
-    coarse_tolerance: Annotated[float, Quantity("", 1e-12, 1e-1)] = 1e-3
+    first_tolerance: Annotated[float, Quantity("", 1e-12, 1e-1)] = 1e-3
     constraint_tolerance: Annotated[float, Quantity("", 1e-12, 1e-3)] = 1e-9
     max_iterations: Annotated[int, Field(ge=1, le=100000)] = 1000
-    fine_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-3
-    refined_initial_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-6
+    first_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-2
+    warm_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-4
+    refined_barrier: Annotated[float, Quantity("", 1e-12, 1.0)] = 1e-6
     ipopt: dict[str, float | int | str] = Field(default_factory=dict)
 
 
@@ -265,8 +269,8 @@ def apply_change(mapping: dict[str, Any], change: str) -> None:
 def smoke_version(config: StudyConfig) -> StudyConfig:
     """Return a config with a short horizon for quick checks: coarse mesh, no refinement."""
     mesh = config.mesh.model_copy(
-        update={"start_intervals_per_phase": 2, "intervals": 0, "refinements": 0}
+        update={"intervals": 16, "least_intervals_per_phase": 2, "refinements": 0}
     )
-    fewer = min(400, config.solver.max_iterations)
-    solver = config.solver.model_copy(update={"max_iterations": fewer})
+    loose = {"max_iterations": min(400, config.solver.max_iterations), "tolerance": 1e-3}
+    solver = config.solver.model_copy(update=loose)
     return config.model_copy(update={"mesh": mesh, "solver": solver, "smoke": True})

@@ -16,7 +16,7 @@ import pytest
 from helpers import stylised_series, walker_of
 from pathwalker_cli.config import PROBLEMS, load_config
 from pathwalker_cli.ocp.gait_bounds import gait_bounds
-from pathwalker_cli.ocp.solve import GaitSolution, StageRecord
+from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
 from pathwalker_cli.ocp.verify import ActiveBound, Reintegration, Violation
 
 MadeSolution = Callable[..., GaitSolution]

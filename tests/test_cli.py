@@ -28,7 +28,7 @@ from pathwalker_cli.model.urdf import urdf_text
 from pathwalker_cli.ocp import solve as ocp_solve
 from pathwalker_cli.ocp.ipopt import ProgressReport
 from pathwalker_cli.ocp.series import gait_series
-from pathwalker_cli.ocp.solve import GaitSolution
+from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.ocp.verify import Violation
 from pathwalker_cli.output import run_folder
 from pathwalker_cli.output.metrics import gait_metrics

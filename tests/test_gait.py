@@ -164,7 +164,7 @@ def test_mesh_follows_durations_and_errors() -> None:
 def test_an_unfinished_solve_is_sealed_and_names_what_is_violated() -> None:
     config = _config()
     solver = config.solver.model_copy(update={"max_iterations": 3})
-    mesh = config.mesh.model_copy(update={"start_intervals_per_phase": 2, "intervals": 0})
+    mesh = config.mesh.model_copy(update={"intervals": 16, "refinements": 0})
     solution = solve_study(config.model_copy(update={"solver": solver, "mesh": mesh}))
     assert solution.status == "the iteration limit was reached"
     with pytest.raises(NotConvergedError, match="did not converge"):

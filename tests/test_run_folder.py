@@ -16,7 +16,7 @@ from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.io.trajectory_csv import read_trajectory
-from pathwalker_cli.ocp.solve import GaitSolution
+from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.ocp.verify import Violation
 from pathwalker_cli.output import run_folder
 from pathwalker_cli.output.motion_file import read_motion, write_motion

@@ -10,7 +10,7 @@ import click
 if TYPE_CHECKING:
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.config import StudyConfig
-    from pathwalker_cli.ocp.solve import GaitSolution
+    from pathwalker_cli.ocp.solution import GaitSolution
     from pathwalker_cli.output.run_folder import Run
     from pathwalker_cli.output.run_metrics import RunInputs
     from pathwalker_cli.patient import Patient

@@ -154,19 +154,38 @@ class Walker:
             vdot [m/s^2, rad/s^2], shape (10,), and forces on the body [N] in the order of
             `conventions.CONTACT_FORCES`, shape (8,); zero where there is no contact.
         """
-        active = list((phase if isinstance(phase, ContactPhase) else phase_named(phase)).indices)
         q, v, tau = _vector(q, 10, "q"), _vector(v, 10, "v"), np.asarray(tau, float).ravel()
         if tau.size == len(COORDINATES) - len(ROOT):
             tau = np.concatenate([np.zeros(len(ROOT)), tau])
         tau = _vector(tau, 10, "tau")
-        mass, bias, jacobian, drift = (np.asarray(k) for k in self._dynamics(q, v))
-        jacobian, drift = jacobian[active], drift.ravel()[active]
-        size, n = len(active), len(COORDINATES)
-        matrix = np.block([[mass, -jacobian.T], [jacobian, np.zeros((size, size))]])
-        solution = np.linalg.solve(matrix, np.concatenate([tau - bias.ravel(), -drift]))
-        forces = np.zeros(len(CONTACT_FORCES))
-        forces[active] = solution[n:]
-        return solution[:n], forces
+        vdot, forces = self.contact_dynamics_series(phase, q[None], v[None], tau[None])
+        return vdot[0], forces[0]
+
+    def contact_dynamics_series(
+        self, phase: str | int | ContactPhase, q: np.ndarray, v: np.ndarray, tau: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return `contact_dynamics` of m instants: vdot, shape (m, 10), and forces, shape (m, 8).
+
+        Args:
+            phase: The contact phase of all instants.
+            q: Generalised coordinates [m, rad], shape (m, 10).
+            v: Generalised velocities [m/s, rad/s], shape (m, 10).
+            tau: Generalised forces [N, N m], shape (m, 10).
+        """
+        active = list((phase if isinstance(phase, ContactPhase) else phase_named(phase)).indices)
+        count, n, size = len(q), len(COORDINATES), len(active)
+        mass, bias, jacobian, drift = (np.asarray(k) for k in self._dynamics(q.T, v.T))
+        # of m instants CasADi sets the matrices side by side
+        jacobian = jacobian.reshape(-1, count, n)[active].swapaxes(0, 1)
+        matrix = np.zeros((count, n + size, n + size))
+        matrix[:, :n, :n] = mass.reshape(n, count, n).swapaxes(0, 1)
+        matrix[:, n:, :n] = jacobian
+        matrix[:, :n, n:] = -jacobian.swapaxes(1, 2)
+        right = np.hstack([tau - bias.T, -drift[active].T])[..., None]
+        solution = np.linalg.solve(matrix, right)[..., 0]
+        forces = np.zeros((count, len(CONTACT_FORCES)))
+        forces[:, active] = solution[:, n:]
+        return solution[:, :n], forces
 
     def contact_points(self, q: Any) -> np.ndarray:
         """Return right heel, right toe, left heel, left toe: x and z [m], shape (4, 2)."""

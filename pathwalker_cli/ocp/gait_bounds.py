@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pathwalker_cli.config import BoundsConfig
-from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GRAVITY
+from pathwalker_cli.conventions import CONTACT_FORCES, CONTACT_POINTS, COORDINATES, GRAVITY
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.ocp.gait import ACTIVATIONS, INTEGRALS, RESERVES, STIFFNESSES, VELOCITIES
+from pathwalker_cli.ocp.gait import ACTIVATIONS, RESERVES, STIFFNESSES, VELOCITIES
 from pathwalker_cli.ocp.problem import INFINITY, BoundTable
 
 __all__ = ["GaitBounds", "gait_bounds", "tracking_bounds"]
@@ -57,6 +57,8 @@ def gait_bounds(walker: Walker, config: BoundsConfig) -> GaitBounds:
     for force in CONTACT_FORCES:
         if force.endswith("z"):
             entries[(force,)] = (config.least_vertical_force, INFINITY)
+    for point in CONTACT_POINTS:
+        entries[(f"{point} height",)] = (config.least_height, INFINITY)
     entries |= _lift_off()
     entries[("distance",)] = config.distance
     entries[("walking_speed",)] = (_least_speed(walker, config, sources), INFINITY)
@@ -88,7 +90,6 @@ def _always() -> dict[tuple[str, ...], Range]:
     entries: dict[tuple[str, ...], Range] = {("pelvis_tx", "first"): (0.0, 0.0)}
     entries[("pelvis_tz",)] = (0.0, 2.0)
     entries |= {(name,): (0.0, 1.0) for name in ACTIVATIONS}
-    entries |= {(name,): (0.0, INFINITY) for name in INTEGRALS}
     return entries
 
 

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.machine import keep_freed_memory, use_one_blas_thread
 
 __all__ = ["IpoptSettings", "Multipliers", "NlpResult", "ProgressReport", "solve_program"]
 
@@ -52,7 +53,10 @@ class IpoptSettings:
             "nlp_scaling_method": "none",
             "mumps_pivtol": 1e-4,
         }
-        if self.warm_start:
+        if not self.warm_start:
+            # barrier problems are only a path to the solution: following them loosely is enough
+            options |= {"barrier_tol_factor": 100.0, "mu_linear_decrease_factor": 0.05}
+        else:
             options["warm_start_init_point"] = "yes"
             # a start on a bound is moved off it by about what the barrier would ask for
             push = min(1e-4, 0.1 * self.initial_barrier)
@@ -222,6 +226,8 @@ def solve_program(
     Returns:
         The last iterate, converged or not.
     """
+    use_one_blas_thread()
+    keep_freed_memory()
     functions = program.program.functions()
     watcher = _Watcher(program, observer)
     options: dict[str, Any] = {

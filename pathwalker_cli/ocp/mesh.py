@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from pathwalker_cli.config import MeshConfig
 from pathwalker_cli.ocp.verify import Reintegration
 
-__all__ = ["by_duration", "refined", "uniform"]
+__all__ = ["by_duration", "first", "refined", "uniform"]
 
 
 def uniform(counts: np.ndarray | list[int]) -> tuple[np.ndarray, ...]:
     """Return equally spaced nodes in [0, 1], one array per phase."""
     return tuple(np.linspace(0.0, 1.0, int(count) + 1) for count in counts)
+
+
+def first(durations: np.ndarray, config: MeshConfig) -> tuple[np.ndarray, ...]:
+    """Return the mesh that a config begins with, for phases of these durations [s]."""
+    if isinstance(config.intervals, tuple):
+        return uniform(list(config.intervals))
+    return by_duration(durations, config.intervals, config.least_intervals_per_phase)
 
 
 def by_duration(

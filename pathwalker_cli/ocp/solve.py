@@ -1,4 +1,4 @@
-"""Solve a gait problem in stages: track a stride, predict on a coarse mesh, then on a fine one."""
+"""Solve a gait problem in stages: track a stride, predict on a coarse mesh, refine the mesh."""
 
 from __future__ import annotations
 
@@ -10,138 +10,43 @@ from functools import cached_property
 import numpy as np
 
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.model.contact import PHASES
-from pathwalker_cli.model.walker import Walker, build_walker
+from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationBlocks, CollocationProgram
 from pathwalker_cli.ocp.gait import STIFFNESSES, GaitProblem, GaitWeights
-from pathwalker_cli.ocp.gait_bounds import GaitBounds, gait_bounds, tracking_bounds
+from pathwalker_cli.ocp.gait_bounds import gait_bounds, tracking_bounds
 from pathwalker_cli.ocp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers
-from pathwalker_cli.ocp.series import GaitSeries, gait_series
+from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
 from pathwalker_cli.ocp.start import ReferenceStride, reference_stride
 from pathwalker_cli.ocp.verify import (
-    ActiveBound,
     Reintegration,
-    Violation,
     active_bounds,
     largest_violations,
     reintegrate,
-    second_engine_residual,
 )
 from pathwalker_cli.patient import load_patient
 
-__all__ = ["GaitSolution", "GaitSolver", "StageRecord", "solve_study"]
+__all__ = ["GaitSolver", "solve_study"]
 
 _TRACKING = GaitWeights(effort=0.0, rate=0.0, tracking=10.0, reserve=10.0, smoothing=0.1)
 """Weights of the first stage: follow the stride, carried by reserve forces where needed."""
 
+_TRACKING_TOLERANCE, _TRACKING_BARRIER = 1e-2, 0.1
+"""A start need not be exact; far from any solution a large barrier takes the fewest iterations."""
+
 _FADED = 0.02
 """Share of the orthosis that acts in the first stage."""
 
-_NEAR_ITERATIONS = 40
+_NEAR_ITERATIONS = 200
 """A refined solve that takes longer has lost the last solution."""
 
+_BARRIER_SHARE = 1e-2
+"""Barrier, as a share of the tolerance of the stage before, that a warm start begins with."""
+
 StageObserver = Callable[[str, ProgressReport], None]
-
-
-@dataclass(frozen=True)
-class StageRecord:
-    """One stage as it went.
-
-    Args:
-        name: "tracking", "coarse", "fine" or "refined 1", ...
-        status: "converged" or the reason why not.
-        intervals: Mesh intervals.
-        unknowns: Size of the nonlinear program.
-        iterations: Iterations.
-        seconds: Wall seconds of the solve.
-        seconds_functions: Part of them in function evaluations.
-    """
-
-    name: str
-    status: str
-    intervals: int
-    unknowns: int
-    iterations: int
-    seconds: float
-    seconds_functions: float
-
-
-@dataclass(frozen=True)
-class GaitSolution:
-    """The end of a solve, converged or not.
-
-    A solution that did not converge is sealed: `series` raises; `last_iterate` says what it is.
-
-    Args:
-        config: What was asked for.
-        walker: Who walks.
-        status: "converged" or the reason why not.
-        last_motion: The last iterate.
-        nlp: What the nonlinear solver returned last.
-        bounds: Bounds that were used and where they come from.
-        cost: Value of the objective.
-        cost_terms: Its terms by name; they add up to the cost.
-        violations: Largest violations, largest first.
-        active: Active bounds.
-        reintegration: Errors of an independent integrator.
-        start: Where the search began.
-        stages: The stages.
-        seconds: Wall seconds by part: build, solve, verify.
-    """
-
-    config: StudyConfig
-    walker: Walker
-    status: str
-    last_motion: PhasedMotion
-    nlp: NlpResult
-    bounds: GaitBounds
-    cost: float
-    cost_terms: dict[str, float]
-    violations: tuple[Violation, ...]
-    active: tuple[ActiveBound, ...]
-    reintegration: Reintegration
-    start: str
-    stages: tuple[StageRecord, ...]
-    seconds: dict[str, float]
-
-    @property
-    def converged(self) -> bool:
-        """Whether the solution meets all tolerances."""
-        return self.status == "converged"
-
-    @property
-    def series(self) -> GaitSeries:
-        """Time series of the solution.
-
-        Raises:
-            NotConvergedError: If it did not converge.
-        """
-        if not self.converged:
-            raise NotConvergedError(
-                f"{self.config.problem} did not converge ({self.status}); "
-                "its last iterate is no solution"
-            )
-        return self.last_iterate
-
-    @cached_property
-    def last_iterate(self) -> GaitSeries:
-        """Time series of the last iterate, converged or not."""
-        return gait_series(self.walker, self.last_motion)
-
-    @cached_property
-    def second_engine(self) -> float:
-        """Largest violation of the equations of motion in numeric Pinocchio [N, N m]."""
-        return second_engine_residual(self.last_iterate)
-
-    @property
-    def iterations(self) -> int:
-        """Iterations over all stages."""
-        return sum(stage.iterations for stage in self.stages)
 
 
 @dataclass
@@ -241,9 +146,7 @@ class GaitSolver:
         assert observer is not None
         return lambda report: observer(name, report)
 
-    def _settings(
-        self, tolerance: float, barrier: float = 0.1, warm: bool = False
-    ) -> IpoptSettings:
+    def _settings(self, tolerance: float, barrier: float, warm: bool = False) -> IpoptSettings:
         solver = self.config.solver
         return IpoptSettings(
             tolerance=tolerance,
@@ -261,35 +164,38 @@ class GaitSolver:
             warm_start: An earlier motion of the same condition to begin with; otherwise the stride
                 of the config is tracked first.
         """
-        config, mesh = self.config, self.config.mesh
+        config, solver = self.config, self.config.solver
         numbers = self.numbers(self.weights, self.bounds.table)
-        coarse = meshing.uniform([mesh.start_intervals_per_phase] * len(PHASES))
-        settings = self._settings(config.solver.coarse_tolerance)
+        loose = max(solver.tolerance, solver.first_tolerance) if config.mesh.refinements else 0.0
         if warm_start is None:
-            program, result = self._track(coarse)
+            program, result = self._track()
             motion = program.to_motion(result.unknowns)
             motion = replace(motion, parameters=self.stiffness_guess())
+            settings = self._settings(loose or solver.tolerance, solver.first_barrier)
         else:
-            motion = warm_start.resampled(coarse, mesh.degree)
-        if not self._interrupted and (warm_start is None or not mesh.intervals):
-            program, result = self.stage("coarse", motion, numbers, settings)
-            motion = program.to_motion(result.unknowns)
-        if mesh.intervals and not self._interrupted:
-            motion = motion if warm_start is None else warm_start
-            program, result, errors = self._fine(motion, numbers)
-        else:
-            errors = self._reintegrated(program.to_motion(result.unknowns))
+            kept = config.mesh.refinements > 0
+            motion = warm_start if kept else self._on_first_mesh(warm_start)
+            settings = self._settings(loose or solver.tolerance, solver.warm_barrier)
+        if not self._interrupted:
+            program, result = self.stage("first mesh", motion, numbers, settings)
+        program, result, errors = self._refine(program, result, settings.tolerance)
         return self._finish(program, result, errors, warm_start is not None)
 
-    def _track(self, coarse: tuple[np.ndarray, ...]) -> tuple[CollocationProgram, NlpResult]:
+    def _on_first_mesh(self, motion: PhasedMotion) -> PhasedMotion:
+        mesh = self.config.mesh
+        return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
+
+    def _track(self) -> tuple[CollocationProgram, NlpResult]:
         """Follow the stride of the start with reserve forces and given durations.
 
         The orthosis is faded out: its steep stops would fight a stride that ignores it.
         """
+        config, stride = self.config, self.stride
         stiffness = _FADED * self.stiffness_guess()
-        table = tracking_bounds(self.bounds, self.stride.durations, stiffness)
-        motion = self.stride.motion(self.walker, stiffness, coarse, self.config.mesh.degree)
-        settings = self._settings(max(1e-2, self.config.solver.coarse_tolerance))
+        table = tracking_bounds(self.bounds, stride.durations, stiffness)
+        meshes = meshing.first(stride.durations, config.mesh)
+        motion = stride.motion(self.walker, stiffness, meshes, config.mesh.degree)
+        settings = self._settings(_TRACKING_TOLERANCE, _TRACKING_BARRIER)
         numbers = self.numbers(_TRACKING, table, _FADED)
         return self.stage("tracking", motion, numbers, settings)
 
@@ -297,29 +203,23 @@ class GaitSolver:
     def _interrupted(self) -> bool:
         return bool(self.stages) and self.stages[-1].status == "stopped by the user"
 
-    def _fine(
-        self,
-        motion: PhasedMotion,
-        numbers: ProblemNumbers,
+    def _refine(
+        self, program: CollocationProgram, result: NlpResult, tolerance: float
     ) -> tuple[CollocationProgram, NlpResult, Reintegration]:
-        """Solve on the fine mesh and refine it until an independent integrator agrees."""
+        """Refine the mesh until an independent integrator agrees."""
         mesh, solver = self.config.mesh, self.config.solver
         tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
-        meshes = meshing.by_duration(
-            motion.durations, mesh.intervals, mesh.least_intervals_per_phase
-        )
-        loose = max(solver.tolerance, 1e-5) if mesh.refinements else solver.tolerance
-        settings = self._settings(loose, solver.fine_initial_barrier)
-        start = motion.resampled(meshes, mesh.degree)
-        program, result = self.stage("fine", start, numbers, settings)
         errors = self._reintegrated(program.to_motion(result.unknowns))
         for attempt in range(1, mesh.refinements + 1):
-            done = _within(errors, tolerances) and (attempt > 1 or loose == solver.tolerance)
+            done = _within(errors, tolerances) and tolerance <= solver.tolerance
             if not result.converged or done or self._interrupted:
                 break
-            meshes = meshing.refined(meshes, errors, *tolerances, order=mesh.degree)
+            numbers = self.numbers(self.weights, self.bounds.table)
+            meshes = meshing.refined(program.meshes, errors, *tolerances, order=mesh.degree)
             start = program.to_motion(result.unknowns).resampled(meshes, mesh.degree)
-            program, result = self._refined(f"refined {attempt}", start, numbers, (program, result))
+            name, before = f"refined {attempt}", (program, result)
+            program, result = self._refined(name, start, numbers, before, tolerance)
+            tolerance = solver.tolerance
             errors = self._reintegrated(program.to_motion(result.unknowns))
         return program, result, errors
 
@@ -329,15 +229,17 @@ class GaitSolver:
         start: PhasedMotion,
         numbers: ProblemNumbers,
         before: tuple[CollocationProgram, NlpResult],
+        tolerance: float,
     ) -> tuple[CollocationProgram, NlpResult]:
         """Solve on a refined mesh from the last solution; without multipliers if that fails."""
         solver = self.config.solver
-        near = self._settings(solver.tolerance, solver.refined_initial_barrier, warm=True)
+        barrier = max(_BARRIER_SHARE * tolerance, solver.refined_barrier)
+        near = self._settings(solver.tolerance, barrier, warm=True)
         near = replace(near, max_iterations=min(_NEAR_ITERATIONS, solver.max_iterations))
         program, result = self.stage(name, start, numbers, near, before)
         if result.converged or self._interrupted:
             return program, result
-        far = self._settings(solver.tolerance, solver.fine_initial_barrier)
+        far = self._settings(solver.tolerance, solver.warm_barrier)
         return self.stage(f"{name} again", start, numbers, far)
 
     def _reintegrated(self, motion: PhasedMotion) -> Reintegration:
@@ -356,7 +258,7 @@ class GaitSolver:
         mesh = self.config.mesh
         status = result.status
         tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
-        if result.converged and mesh.intervals and not _within(errors, tolerances):
+        if result.converged and mesh.refinements and not _within(errors, tolerances):
             status = "the mesh does not reach the accuracy asked for"
         motion = program.to_motion(result.unknowns)
         return GaitSolution(

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES
-from pathwalker_cli.model.walker import Walker
+from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.ipopt import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
@@ -151,37 +152,44 @@ def reintegrate(walker: Walker, motion: PhasedMotion) -> Reintegration:
     Accelerations come from the contact-constrained dynamics of the walker, not from the
     unknowns of the program; activations follow from their rates.
     """
-    torques = actuator_torques(walker)
-    n = len(COORDINATES)
+    n, torques = len(COORDINATES), actuator_torques(walker)
     positions, velocities = [], []
     for phase in motion.phases:
-        errors = np.array([_interval_error(walker, motion, phase, i, torques) for i in
-                           range(phase.intervals)])  # fmt: skip
+        errors = _interval_errors(walker, torques, phase, motion.parameters)
         positions.append(errors[:, :n].max(axis=1))
         velocities.append(errors[:, n:].max(axis=1))
     return Reintegration(tuple(positions), tuple(velocities))
 
 
-def _interval_error(walker, motion, phase: PhaseMotion, i: int, torques) -> np.ndarray:  # type: ignore[no-untyped-def]
-    """Return the absolute errors of q and v at the end of one interval, shape (20,)."""
-    n = len(COORDINATES)
-    start, step = phase.mesh[i], float(np.diff(phase.mesh)[i])
+def _interval_errors(
+    walker: Walker, torques: ca.Function, phase: PhaseMotion, stiffness: np.ndarray
+) -> np.ndarray:
+    """Return the absolute errors of q and v at the end of every interval, shape (N, 20).
 
-    def rate(share: float, state: np.ndarray) -> np.ndarray:
-        activation = phase.smooth_at(np.array([start + step * share]))[0]
-        q, v = state[:n], state[n:]
-        muscle, orthosis = (np.asarray(k) for k in torques(q, v, activation, motion.parameters))
-        tau = walker.joint_torques(muscle, orthosis)
-        vdot, _ = walker.contact_dynamics(phase.name, q, v, tau)
-        return phase.duration * step * np.concatenate([v, vdot])
+    All intervals of a phase are integrated side by side, each over its own share of time.
+    """
+    n, count = len(COORDINATES), phase.intervals
+    starts, steps = phase.mesh[:-1], np.diff(phase.mesh)
+    parameters = np.tile(np.asarray(stiffness)[:, None], count)
+
+    def rate(share: float, stacked: np.ndarray) -> np.ndarray:
+        state = stacked.reshape(count, 2 * n)
+        q, v = state[:, :n], state[:, n:]
+        activation = phase.smooth_at(starts + steps * share)
+        muscle, orthosis = torques(q.T, v.T, activation.T, parameters)
+        tau = np.zeros((n, count))
+        np.add.at(tau, list(GENERATOR_ROWS), np.asarray(muscle))
+        np.add.at(tau, list(ANKLES), np.asarray(orthosis))
+        vdot, _ = walker.contact_dynamics_series(phase.name, q, v, tau.T)
+        return np.asarray(phase.duration * steps[:, None] * np.hstack([v, vdot])).ravel()
 
     inside = 1 - 1e-12  # the end itself belongs to the next interval
     solution = solve_ivp(
-        rate, (0.0, inside), phase.states[i], method="DOP853", rtol=1e-9, atol=1e-10
+        rate, (0.0, inside), phase.states[:-1].ravel(), method="DOP853", rtol=1e-9, atol=1e-10
     )
     if not solution.success:
-        return np.full(2 * n, np.inf)
-    return np.asarray(np.abs(solution.y[:, -1] - phase.states[i + 1]))
+        return np.full((count, 2 * n), np.inf)
+    return np.abs(solution.y[:, -1].reshape(count, 2 * n) - phase.states[1:])
 
 
 def second_engine_residual(series: GaitSeries) -> float:

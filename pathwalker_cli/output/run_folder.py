@@ -20,7 +20,7 @@ from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.ocp.gait import STIFFNESSES
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.ocp.solve import GaitSolution
+from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output.figures import save_figures
 from pathwalker_cli.output.motion_file import read_motion, write_motion
 from pathwalker_cli.output.recorded_reference import recorded_reference

@@ -13,7 +13,7 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.ocp.gait import STIFFNESSES
-from pathwalker_cli.ocp.solve import GaitSolution
+from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output.metrics import gait_metrics
 from pathwalker_cli.output.versions import versions
 from pathwalker_cli.patient import Patient

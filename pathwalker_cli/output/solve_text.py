@@ -9,7 +9,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, to_degrees
 from pathwalker_cli.ocp.gait import STIFFNESSES
-from pathwalker_cli.ocp.solve import GaitSolution
+from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.ocp.verify import ActiveBound
 
 __all__ = ["bound_lines", "detail_lines", "failure_text", "interesting", "source_lines"]
