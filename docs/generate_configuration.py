@@ -18,9 +18,10 @@ from annotated_types import Ge, Le
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from pathwalker_cli.config import PROBLEMS, StudyConfig
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematicsConfig
 from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.problems import PROBLEMS
 
 PAGE: Final = Path(__file__).with_name("configuration.md")
 CONFIGS: Final = PAGE.parent.parent / "configs"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
@@ -14,9 +15,9 @@ from pathwalker_cli.io.yaml_file import read_mapping, read_value, validate
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient_blocks import Stiffness
+from pathwalker_cli.problems import PROBLEMS
 
 __all__ = [
-    "PROBLEMS",
     "BoundsConfig",
     "CostConfig",
     "MeshConfig",
@@ -25,15 +26,11 @@ __all__ = [
     "StartConfig",
     "StudyConfig",
     "apply_change",
-    "condition_of",
     "find_config",
     "load_config",
     "patient_path",
     "smoke_version",
 ]
-
-PROBLEMS: Final[dict[str, Condition]] = {"mapd-orthosis": "orthosis", "mapd-barefoot": "barefoot"}
-"""Problems that can be solved and the condition each one is about."""
 
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
 Range = Annotated[tuple[Angle, Angle], AS_TUPLE]
@@ -69,6 +66,8 @@ class CostConfig(YamlModel):
     rate_weight: Weight = 2e-2
     acceleration_weight: Weight = 1e-3
     walking_speed_weight: Weight = 0.0
+    fit_weight: Weight = 1.0
+    excitation_weight: Weight = 1e-4
 
 
 class BoundsConfig(YamlModel):
@@ -135,7 +134,7 @@ class MeshConfig(YamlModel):
     intervals: (
         Annotated[int, Field(ge=8, le=1000)]
         | Annotated[tuple[Annotated[int, Field(ge=1, le=200)], ...], AS_TUPLE]
-    ) = 32
+    ) = 48
     least_intervals_per_phase: Annotated[int, Field(ge=1, le=50)] = 2
     position_tolerance: Annotated[float, Quantity("rad or m", 1e-8, 1.0)] = 1e-3
     velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2
@@ -176,7 +175,15 @@ class StudyConfig(YamlModel):
     mesh: MeshConfig = MeshConfig()
     start: StartConfig = StartConfig()
     solver: SolverConfig = SolverConfig()
+    half_cycle: bool = False
     smoke: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _defaults(cls, value: Any) -> Any:
+        """Let the defaults of the problem stand where the config is silent."""
+        problem = PROBLEMS.get(str(value.get("problem"))) if isinstance(value, dict) else None
+        return value if problem is None else merged(problem.defaults, value)
 
     @field_validator("problem")
     @classmethod
@@ -192,23 +199,33 @@ class StudyConfig(YamlModel):
                 "names a start.trial but start.gait is synthetic",
                 mend="set start.gait to recorded, or leave start.trial out",
             )
+        if self.fits and (self.half_cycle or self.start.gait != "recorded"):
+            raise invalid(
+                f"asks {self.problem} for a "
+                + ("half cycle" if self.half_cycle else "synthetic start"),
+                allowed="a whole recorded passage: start.gait recorded, half_cycle false",
+            )
         return self
 
     @property
     def condition(self) -> Condition:
         """Condition that the problem is about."""
-        return PROBLEMS[self.problem]
+        return PROBLEMS[self.problem].condition
+
+    @property
+    def fits(self) -> bool:
+        """Whether a recording is followed, equation (8), instead of a gait predicted."""
+        return PROBLEMS[self.problem].goal == "fit"
 
 
-def condition_of(problem: str) -> Condition:
-    """Return the condition of a problem.
-
-    Raises:
-        ConfigError: If there is no such problem.
-    """
-    if problem not in PROBLEMS:
-        raise ConfigError(f"there is no problem '{problem}'", allowed=", ".join(PROBLEMS))
-    return PROBLEMS[problem]
+def merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Return two nested mappings as one; where both have a value, `over` counts."""
+    result = dict(under)
+    for key, value in over.items():
+        below = result.get(key)
+        both = isinstance(below, Mapping) and isinstance(value, Mapping)
+        result[key] = merged(below, value) if both else value
+    return result
 
 
 def load_config(path: str | Path, problem: str = "", changes: tuple[str, ...] = ()) -> StudyConfig:

@@ -101,6 +101,21 @@ def generator_coordinate(name: str) -> str:
     return parts[0] if len(parts) == 2 else f"{parts[0]}_{parts[2]}"
 
 
+def mirrored(name: str) -> str:
+    """Return the name of the same thing on the other side; midline names stay."""
+    for a, b in (("_r", "_l"), ("_l", "_r"), ("_right", "_left"), ("_left", "_right")):
+        if name.endswith(a):
+            return name.removesuffix(a) + b
+        if f"{a}_" in name:
+            return name.replace(f"{a}_", f"{b}_")
+    return name
+
+
+def mirror_permutation(names: tuple[str, ...]) -> np.ndarray:
+    """Return the index array that exchanges left and right in a vector with these names."""
+    return np.array([names.index(mirrored(name)) for name in names], dtype=int)
+
+
 def to_degrees(values: np.ndarray | float) -> np.ndarray:
     """Convert angles from rad to degrees, for figures and tables only."""
     return np.rad2deg(values)

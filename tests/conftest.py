@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 from helpers import stylised_series, walker_of
-from pathwalker_cli.config import PROBLEMS, load_config
+from pathwalker_cli.config import load_config
 from pathwalker_cli.ocp.gait_bounds import gait_bounds
 from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
 from pathwalker_cli.ocp.verify import ActiveBound, Reintegration, Violation
+from pathwalker_cli.problems import PROBLEMS
 
 MadeSolution = Callable[..., GaitSolution]
 
@@ -43,13 +44,13 @@ def made_solution() -> MadeSolution:
 
     def make(problem: str = "mapd-orthosis", **changes: Any) -> GaitSolution:
         config = load_config(problem)
-        walker = walker_of(PROBLEMS[problem])
+        walker = walker_of(PROBLEMS[problem].condition)
         errors = (np.array([2e-4, 5e-4]), np.array([3e-4]))
         solution = GaitSolution(
             config=config,
             walker=walker,
             status="converged",
-            last_motion=(stylised_series(PROBLEMS[problem]).motion),
+            last_motion=(stylised_series(PROBLEMS[problem].condition).motion),
             nlp=None,  # type: ignore[arg-type]
             bounds=gait_bounds(walker, config.bounds),
             cost=0.4,

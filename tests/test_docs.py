@@ -16,7 +16,7 @@ import yaml
 
 from conftest import MadeSolution
 from pathwalker_cli import __version__, load_patient
-from pathwalker_cli.config import PROBLEMS, StudyConfig, load_config
+from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.yaml_file import read_mapping, validate
@@ -24,6 +24,7 @@ from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.output.figures import FIGURES
 from pathwalker_cli.output.run_folder import ENTRIES
 from pathwalker_cli.output.run_metrics import RunInputs, run_metrics
+from pathwalker_cli.problems import PROBLEMS
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -82,10 +83,18 @@ def test_generated_page_is_fresh(name: str) -> None:
     assert (DOCS / name).read_text(encoding="utf-8") == wanted, mend
 
 
-@pytest.mark.parametrize("problem", PROBLEMS)
-def test_shipped_config_holds_the_defaults(problem: str) -> None:
+@pytest.mark.parametrize("problem", ["mapd-orthosis", "mapd-barefoot"])
+def test_complete_shipped_config_holds_the_defaults(problem: str) -> None:
     config = load_config(problem)
     assert config == StudyConfig(problem=problem, patient=config.patient)
+
+
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_shipped_config_says_what_its_problem_sets_by_default(problem: str) -> None:
+    config, bare = load_config(problem), StudyConfig(problem=problem, patient="someone")
+    assert (config.cost, config.half_cycle, config.start.gait) == (
+        bare.cost, bare.half_cycle, bare.start.gait,
+    )  # fmt: skip
 
 
 def test_shipped_inverse_dynamics_holds_the_defaults() -> None:

@@ -47,7 +47,7 @@ def solve_command(
     changes: tuple[str, ...],
     quiet: bool,
 ) -> None:
-    """Solve PROBLEM (mapd-orthosis or mapd-barefoot) as CONFIG says and write a run folder.
+    """Solve PROBLEM, e.g. mapd-orthosis, as CONFIG says and write a run folder.
 
     CONFIG is a YAML file or the name of a shipped one. Ctrl-C stops after the current iteration
     and keeps the last iterate. Exit codes: 0 converged, 1 not converged, 2 bad input.
@@ -81,11 +81,12 @@ def _study(
     problem: str, path: str, changes: tuple[str, ...], smoke: bool
 ) -> tuple[StudyConfig, Patient]:
     """Return the config with all overrides, and its patient."""
-    from pathwalker_cli.config import condition_of, load_config, smoke_version
+    from pathwalker_cli.config import load_config, smoke_version
     from pathwalker_cli.errors import PatientError
     from pathwalker_cli.patient import load_patient
+    from pathwalker_cli.problems import problem_named
 
-    condition_of(problem)
+    problem_named(problem)
     study = load_config(path, problem, changes)
     try:
         patient = load_patient(study.patient)

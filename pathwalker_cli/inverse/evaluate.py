@@ -41,6 +41,7 @@ __all__ = [
     "dynamics_trials",
     "imported_trial",
     "kinematics_trials",
+    "recorded_trials",
 ]
 
 Progress = Callable[[str], None]
@@ -119,7 +120,7 @@ def dynamics_trials(
         if config.source == "c3d":
             found = _c3d_dynamics(config, patient, condition, progress)
         else:
-            found = _shipped_dynamics(config, patient, condition, progress)
+            found = recorded_trials(config, patient, condition, progress)
         trials += found
     _require_forces(trials)
     return tuple(trials)
@@ -157,10 +158,16 @@ def _c3d_dynamics(
     return trials
 
 
-def _shipped_dynamics(
+def recorded_trials(
     config: InverseDynamicsConfig, patient: Patient, condition: Condition, progress: Progress
 ) -> list[StudyTrial]:
-    """Return the trials of one condition from the files beside the patient's file."""
+    """Return the trials of one condition from the files beside the patient's file.
+
+    Unlike `dynamics_trials` it accepts that there is none, and trials without forces.
+
+    Raises:
+        DataError: If a recording cannot be used.
+    """
     trials = []
     for name in recording_names(patient, condition):
         if config.trials and name not in config.trials:

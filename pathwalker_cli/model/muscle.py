@@ -203,7 +203,7 @@ def activation_rate(excitation: Any, activation: Any) -> Any:
     return difference * choose(difference >= 0, rising, 1 / DEACTIVATION_TIME)
 
 
-def excitation_from_rate(rate: np.ndarray, activation: np.ndarray) -> np.ndarray:
+def excitation_from_rate(rate: Any, activation: Any) -> Any:
     """Return the neural excitation that gives an activation rate: the inverse of equation (2).
 
     For fixed a, equation (2) increases strictly in e, so 0 <= e <= 1 is the same as
@@ -218,7 +218,11 @@ def excitation_from_rate(rate: np.ndarray, activation: np.ndarray) -> np.ndarray
     """
     faster = 1 / ACTIVATION_TIME - 1 / DEACTIVATION_TIME
     linear = 1 / DEACTIVATION_TIME - activation * faster
-    constant = -(activation / DEACTIVATION_TIME + rate)
-    root = np.sqrt(np.maximum(linear**2 - 4 * faster * constant, 0.0))
+    symbolic = isinstance(rate, ca.SX | ca.MX)
+    # the branch that is not taken must be finite too, and so must its derivative
+    upward = ca.fmax(rate, 0.0) if symbolic else np.maximum(rate, 0.0)
+    constant = -(activation / DEACTIVATION_TIME + upward)
+    root = (ca.sqrt if symbolic else np.sqrt)(linear**2 - 4 * faster * constant)
     rising = (-linear + root) / (2 * faster)
-    return np.where(rate < 0, activation + DEACTIVATION_TIME * rate, rising)
+    choose = ca.if_else if symbolic else np.where
+    return choose(rate < 0, activation + DEACTIVATION_TIME * rate, rising)

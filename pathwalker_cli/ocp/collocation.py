@@ -86,6 +86,7 @@ class CollocationBlocks:
         )
         self.node = self._node_block()
         self.boundary = self._boundary_block()
+        self.sample = self._sample_block()
 
     def _point_block(self, phase: Phase, rows: Rows, label: str) -> Block:
         """Return rows at one collocation point; unknowns T, p, x, z, y0, u0, u1."""
@@ -201,6 +202,20 @@ class CollocationBlocks:
         unknowns = ca.vertcat(y.scaled, u.scaled)
         return Block("node", unknowns, ca.SX(0, 1), problem.shared, value)
 
+    def _sample_block(self) -> Block:
+        """Return the objective at an instant inside an interval.
+
+        Unknowns x0 and x at all points; data are their interpolation weights and the point data.
+        """
+        problem, count = self.problem, self.degree + 1
+        states = [_Unknown.of(problem.states, f"x{k}") for k in range(count)]
+        weights = ca.SX.sym("weights", count)
+        value = sum(weights[k] * x.value for k, x in enumerate(states))
+        (cost,) = ca.substitute([problem.sample], [problem.states.symbol], [value])
+        unknowns = ca.vertcat(*(x.scaled for x in states))
+        data = ca.vertcat(weights, problem.point_data)
+        return Block("sample", unknowns, data, problem.shared, ca.SX(0, 1), cost)
+
     def _boundary_block(self) -> Block:
         """Return boundary rows and objective.
 
@@ -243,7 +258,12 @@ class CollocationProgram:
         self.meshes = meshes
         problem = blocks.problem
         self.layout = Layout.make(problem, meshes, blocks.degree)
-        occurrences = [*self._phase_occurrences(), self._node_rows(), self._boundary_rows()]
+        occurrences = [
+            *self._phase_occurrences(),
+            self._node_rows(),
+            self._boundary_rows(),
+            self._samples(),
+        ]
         self.program = BlockProgram(self.layout.size, occurrences, problem.shared.numel())
 
     @property
@@ -411,6 +431,31 @@ class CollocationProgram:
             labels,
             times=np.tile(times, (len(rows.names), 1)),
             weights=np.tile(weights, (len(rows.names), 1)),
+        )
+
+    def _samples(self) -> Occurrences:
+        """Return the instants at which the motion is compared with something."""
+        samples = self.numbers.samples
+        nodes = np.concatenate([[0.0], collocation_times(self.blocks.degree)])
+        columns, data = [], []
+        for sample in samples:
+            mesh, places = self.meshes[sample.phase], self.layout.phases[sample.phase]
+            n = int(np.clip(np.searchsorted(mesh, sample.fraction, "right") - 1, 0, len(mesh) - 2))
+            local = (sample.fraction - mesh[n]) / (mesh[n + 1] - mesh[n])
+            states = [self.layout.states[places.nodes[n]], *places.inner_states[n]]
+            columns.append(np.concatenate(states))
+            weights = lagrange_weights(nodes, np.array([local]))[0]
+            data.append(np.concatenate([weights, sample.data]))
+        none = np.zeros((0, len(samples)))
+        return Occurrences(
+            self.blocks.sample,
+            np.array(columns).T if samples else none,
+            np.array(data).T if samples else none,
+            none,
+            none,
+            np.zeros(0),
+            (),
+            [self._label(sample.phase, sample.fraction) for sample in samples],
         )
 
     def _boundary_rows(self) -> Occurrences:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Final
+from typing import Final, Literal
 
 import casadi as ca
 import numpy as np
@@ -25,21 +25,29 @@ from pathwalker_cli.conventions import (
 )
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 from pathwalker_cli.model.curves import BezierChain, evaluate
-from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME
+from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME, excitation_from_rate
 from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
 from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
 from pathwalker_cli.ocp.frozen import FrozenTerms
+from pathwalker_cli.ocp.gait_boundary import gait_boundary
 from pathwalker_cli.ocp.problem import (
     INFINITY,
     Boundary,
-    Instant,
     MultiPhaseProblem,
     Phase,
     Rows,
     Variables,
 )
 
-__all__ = ["INTEGRALS", "STIFFNESSES", "WEIGHTS", "GaitProblem", "GaitWeights"]
+__all__ = [
+    "INTEGRALS",
+    "PASSAGE_INTEGRALS",
+    "STIFFNESSES",
+    "WEIGHTS",
+    "Form",
+    "GaitProblem",
+    "GaitWeights",
+]
 
 VELOCITIES: Final = tuple(f"{name}_velocity" for name in COORDINATES)
 ACCELERATIONS: Final = tuple(f"{name}_acceleration" for name in COORDINATES)
@@ -53,6 +61,12 @@ STIFFNESSES: Final = tuple(
 INTEGRALS: Final = ("effort", "rate", "acceleration", "tracking", "reserve")
 """Running costs: the sums of a^2, (rate / 20)^2, (vdot / 50)^2, (q - q_ref)^2 and
 (reserve / 20)^2."""
+PASSAGE_INTEGRALS: Final = (*INTEGRALS, "excitation")
+"""Running costs of a passage: also the sum of the squared excitations."""
+
+Form = Literal["stride", "step", "passage"]
+"""A periodic stride of eight phases, one step of a symmetric gait, or a stride from a recording
+that need not be periodic."""
 
 # What counts as 1 for the solver; with these the prototypes needed the fewest iterations.
 _VELOCITY, _ACCELERATION, _FORCE, _TORQUE = 5.0, 50.0, 100.0, 20.0
@@ -71,6 +85,8 @@ class GaitWeights:
         tracking: Weight of the integral of (q - q_ref)^2.
         reserve: Weight of the integral of the squared reserve forces.
         smoothing: Weight of the integrals of squared activations and rates, not per distance.
+        fit: Weight of the sum over recorded instants of (q - q_recorded)^2, equation (8).
+        excitation: delta of equation (8), weight of the integral of the squared excitations.
     """
 
     effort: float = 1.0
@@ -80,6 +96,8 @@ class GaitWeights:
     tracking: float = 0.0
     reserve: float = 0.0
     smoothing: float = 0.0
+    fit: float = 0.0
+    excitation: float = 0.0
 
     def vector(self) -> np.ndarray:
         """Return the weights in the order of `WEIGHTS`."""
@@ -94,6 +112,8 @@ WEIGHTS: Final = (
     "tracking",
     "reserve",
     "smoothing",
+    "fit",
+    "excitation",
 )
 
 
@@ -157,10 +177,14 @@ class GaitProblem:
 
     Args:
         walker: The walker; its condition decides whether there are stiffnesses to find.
+        form: What the phases are.
     """
 
-    def __init__(self, walker: Walker) -> None:
+    def __init__(self, walker: Walker, form: Form = "stride") -> None:
         self.walker = walker
+        self.form = form
+        self.phases = PHASES[: len(PHASES) // 2] if form == "step" else PHASES
+        self.integrals = PASSAGE_INTEGRALS if form == "passage" else INTEGRALS
         self.constants = _Constants(walker)
         scale = np.concatenate([np.ones(len(COORDINATES)), np.full(len(COORDINATES), _VELOCITY)])
         self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
@@ -182,7 +206,7 @@ class GaitProblem:
 
     def build(self) -> MultiPhaseProblem:
         """Return the problem's structure."""
-        following = PHASES[1:] + PHASES[:1]
+        following = [PHASES[(i + 1) % len(PHASES)] for i in range(len(self.phases))]
         return MultiPhaseProblem(
             states=self.states,
             smooth=self.activations,
@@ -190,11 +214,12 @@ class GaitProblem:
             parameters=self.stiffness,
             shared=self.constants.vector,
             point_data=self.reference,
-            integrals=INTEGRALS,
-            integral_scale=np.ones(len(INTEGRALS)),
-            phases=tuple(self._phase(*pair) for pair in zip(PHASES, following, strict=True)),
+            integrals=self.integrals,
+            integral_scale=np.ones(len(self.integrals)),
+            phases=tuple(self._phase(*pair) for pair in zip(self.phases, following, strict=True)),
             node_rows=self._excitation_rows(),
             boundary=self._boundary(),
+            sample=self._sample(),
         )
 
     def shared_values(
@@ -268,13 +293,23 @@ class GaitProblem:
         }
 
     def _integrands(self, vdot: ca.SX, reserve: ca.SX) -> ca.SX:
-        return ca.vertcat(
+        terms = [
             ca.sumsqr(self.activations.symbol),
             ca.sumsqr(self.rates.symbol / _RATE),
             ca.sumsqr(vdot / _ACCELERATION),
             ca.sumsqr(self.q - self.reference),
             ca.sumsqr(reserve / _TORQUE),
-        )
+        ]
+        if "excitation" in self.integrals:
+            excitation = excitation_from_rate(self.rates.symbol, self.activations.symbol)
+            terms.append(ca.sumsqr(excitation))
+        return ca.vertcat(*terms)
+
+    def _sample(self) -> ca.SX:
+        """Return the cost of one recorded instant of a passage."""
+        if self.form != "passage":
+            return ca.SX(0)
+        return self.constants.weights[WEIGHTS.index("fit")] * ca.sumsqr(self.q - self.reference)
 
     def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
         """Return heights of the points in the air and the friction cones of the loaded feet."""
@@ -350,38 +385,30 @@ class GaitProblem:
         )
 
     def _boundary(self) -> Boundary:
-        groups = (self.states, self.activations, self.rates)
-        first, last = _instant(groups, "first"), _instant(groups, "last")
-        durations = ca.SX.sym("durations", len(PHASES))
-        integrals = ca.SX.sym("integrals", len(INTEGRALS))
-        distance, total = last[0][0] - first[0][0], ca.sum1(durations)
-        periodic = [
-            Rows.make(
-                (b - a)[skip:],
-                tuple(f"{name} periodicity" for name in group.names[skip:]),
-                group.scale[skip:],
-            )
-            for a, b, group, skip in zip(first, last, groups, (1, 0, 0), strict=True)
-        ]
-        free = Rows.make(
-            ca.vertcat(distance, distance / total),
-            ("distance", "walking_speed"),
-            1.0,
-            -INFINITY,
-            INFINITY,
+        weights = dict(zip(WEIGHTS, ca.vertsplit(self.constants.weights), strict=True))
+        return gait_boundary(
+            (self.states, self.activations, self.rates),
+            self.stiffness,
+            self.integrals,
+            weights,
+            len(self.phases),
+            self.form == "step",
+            self._standing() if self.form == "passage" else None,
         )
-        weight = dict(zip(WEIGHTS, ca.vertsplit(self.constants.weights), strict=True))
-        total_of = dict(zip(INTEGRALS, ca.vertsplit(integrals), strict=True))
-        per_distance = sum(weight[k] * total_of[k] for k in ("effort", "rate", "acceleration"))
-        objective = per_distance / distance
-        objective += weight["tracking"] * total_of["tracking"]
-        objective += weight["reserve"] * total_of["reserve"]
-        objective += weight["smoothing"] * (total_of["effort"] + total_of["rate"])
-        objective -= weight["walking_speed"] * distance / total
-        return Boundary(first, last, durations, integrals, Rows.join(*periodic, free), objective)
 
-
-def _instant(groups: tuple[Variables, Variables, Variables], label: str) -> Instant:
-    """Return fresh symbols for x, y and u at one instant."""
-    x, y, u = (ca.SX.sym(f"{label}{i}", group.size) for i, group in enumerate(groups))
-    return x, y, u
+    def _standing(self) -> Rows:
+        """Return the rows that let the first phase begin on the ground and at rest there."""
+        contact, motion = self.phases[0], self._point_motion(ca.SX.zeros(len(COORDINATES)))
+        vertical = [n for n in contact.forces if n.endswith("z")]
+        return Rows.join(
+            Rows.make(
+                motion["position"][[CONTACT_FORCES.index(n) for n in vertical]],
+                tuple(f"{n[:-2]} height at the start" for n in vertical),
+                _HEIGHT,
+            ),
+            Rows.make(
+                motion["velocity"][list(contact.indices)],
+                tuple(f"{n} velocity at the start" for n in contact.forces),
+                1.0,
+            ),
+        )

@@ -14,7 +14,7 @@ from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.gait import ACTIVATIONS, RESERVES, STIFFNESSES, VELOCITIES
 from pathwalker_cli.ocp.problem import INFINITY, BoundTable
 
-__all__ = ["GaitBounds", "gait_bounds", "tracking_bounds"]
+__all__ = ["GaitBounds", "gait_bounds", "recorded_durations", "tracking_bounds"]
 
 Range = tuple[float, float]
 
@@ -65,6 +65,14 @@ def gait_bounds(walker: Walker, config: BoundsConfig) -> GaitBounds:
     entries |= _stiffness(walker, config, sources)
     entries |= {(name,): (0.0, 0.0) for name in RESERVES}
     return GaitBounds(BoundTable(entries), sources)
+
+
+def recorded_durations(bounds: GaitBounds, durations: np.ndarray) -> GaitBounds:
+    """Return bounds that fix the phases to their recorded durations [s], shape (8,)."""
+    pairs = list(zip(PHASES, durations.tolist(), strict=True))
+    table = bounds.table.replace({("duration", phase.name): (d, d) for phase, d in pairs})
+    sources = {f"duration of {phase.name}": f"{d:.4g} s, as recorded" for phase, d in pairs}
+    return GaitBounds(table, {**bounds.sources, **sources})
 
 
 def tracking_bounds(bounds: GaitBounds, durations: np.ndarray, stiffness: np.ndarray) -> BoundTable:

@@ -28,6 +28,7 @@ __all__ = [
     "Phase",
     "ProblemNumbers",
     "Rows",
+    "Sample",
     "Variables",
 ]
 
@@ -171,6 +172,8 @@ class MultiPhaseProblem:
         phases: The phases in order.
         node_rows: Rows in y and u that hold at every mesh node.
         boundary: Boundary rows and objective.
+        sample: Term of the objective at every instant of `ProblemNumbers.samples`, scalar SX in
+            states, point data and constants.
     """
 
     states: Variables
@@ -184,6 +187,7 @@ class MultiPhaseProblem:
     phases: tuple[Phase, ...]
     node_rows: Rows
     boundary: Boundary
+    sample: ca.SX = field(default_factory=lambda: ca.SX(0))
 
 
 @dataclass(frozen=True)
@@ -219,6 +223,21 @@ class BoundTable:
 
 
 @dataclass(frozen=True)
+class Sample:
+    """An instant at which a motion is compared with something.
+
+    Args:
+        phase: Number of the phase.
+        fraction: Share of the phase that has gone by, in [0, 1].
+        data: Point data of the instant, shape (m,).
+    """
+
+    phase: int
+    fraction: float
+    data: np.ndarray
+
+
+@dataclass(frozen=True)
 class ProblemNumbers:
     """The numbers of a problem; changing them never needs new derivatives.
 
@@ -228,8 +247,10 @@ class ProblemNumbers:
             defaults are to be replaced.
         point_data: Returns the point data, shape (m,), for a phase number and a fraction of that
             phase in [0, 1].
+        samples: Instants at which `MultiPhaseProblem.sample` is added to the objective.
     """
 
     shared: np.ndarray
     bounds: BoundTable
     point_data: Callable[[int, float], np.ndarray]
+    samples: tuple[Sample, ...] = ()

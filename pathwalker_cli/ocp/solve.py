@@ -10,17 +10,21 @@ from functools import cached_property
 import numpy as np
 
 from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationBlocks, CollocationProgram
-from pathwalker_cli.ocp.gait import STIFFNESSES, GaitProblem, GaitWeights
-from pathwalker_cli.ocp.gait_bounds import gait_bounds, tracking_bounds
+from pathwalker_cli.ocp.cost_terms import cost_terms
+from pathwalker_cli.ocp.gait import STIFFNESSES, Form, GaitProblem, GaitWeights
+from pathwalker_cli.ocp.gait_bounds import gait_bounds, recorded_durations, tracking_bounds
 from pathwalker_cli.ocp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
 from pathwalker_cli.ocp.multipliers import transferred
+from pathwalker_cli.ocp.passage import passage_samples, recorded_passage
 from pathwalker_cli.ocp.phased import PhasedMotion
-from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers
+from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers, Sample
 from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
-from pathwalker_cli.ocp.start import ReferenceStride, reference_stride
+from pathwalker_cli.ocp.start import ReferenceStride, reference_stride, start_recording
+from pathwalker_cli.ocp.symmetry import asymmetries, full_stride
 from pathwalker_cli.ocp.verify import (
     Reintegration,
     active_bounds,
@@ -39,9 +43,6 @@ _TRACKING_TOLERANCE, _TRACKING_BARRIER = 1e-2, 0.1
 
 _FADED = 0.02
 """Share of the orthosis that acts in the first stage."""
-
-_NEAR_ITERATIONS = 200
-"""A refined solve that takes longer has lost the last solution."""
 
 _BARRIER_SHARE = 1e-2
 """Barrier, as a share of the tolerance of the stage before, that a warm start begins with."""
@@ -72,11 +73,33 @@ class GaitSolver:
         model = self.config.model
         self.walker = build_walker(patient, self.config.condition, model.published, model.backend)
         self.bounds = gait_bounds(self.walker, self.config.bounds)
-        self.gait = GaitProblem(self.walker)
+        self.gait = GaitProblem(self.walker, self._form())
         if self.config.start.gait == "recorded":
             _ = self.stride  # a missing recording is refused before anything is built
+        if self.config.fits:
+            self.bounds = recorded_durations(self.bounds, self.stride.durations)
         self.blocks = CollocationBlocks(self.gait.build(), self.config.mesh.degree)
         self.seconds["build"] += time.perf_counter() - began
+
+    def _form(self) -> Form:
+        """Return what the phases are.
+
+        Raises:
+            ConfigError: If half a cycle is asked for, but left and right differ.
+        """
+        if self.config.fits:
+            return "passage"
+        if not self.config.half_cycle:
+            return "stride"
+        differing = asymmetries(self.walker)
+        if differing:
+            raise ConfigError(
+                f"asks for half a cycle, but {', '.join(differing)} differ between the sides of "
+                f"{self.walker.patient.id}",
+                where="half_cycle",
+                mend="set half_cycle to false",
+            )
+        return "step"
 
     @property
     def weights(self) -> GaitWeights:
@@ -87,13 +110,23 @@ class GaitSolver:
             rate=cost.rate_weight,
             acceleration=cost.acceleration_weight,
             walking_speed=cost.walking_speed_weight,
+            fit=cost.fit_weight,
+            excitation=cost.excitation_weight,
         )
 
     @cached_property
     def stride(self) -> ReferenceStride:
-        """The stride that a solve without warm start begins with."""
+        """The stride that a solve without warm start begins with; of a fit, what is followed."""
+        start = self.config.start
+        if self.config.fits:
+            return recorded_passage(self.walker, start_recording(self.walker, start))
         speed = self.bounds.table.entries[("walking_speed",)][0]
-        return reference_stride(self.walker, self.config.start, speed)
+        return reference_stride(self.walker, start, speed)
+
+    @cached_property
+    def samples(self) -> tuple[Sample, ...]:
+        """The recorded instants that a fit follows."""
+        return passage_samples(self.stride) if self.config.fits else ()
 
     def stiffness_guess(self) -> np.ndarray:
         """Return the guess of the free stiffnesses [N m/rad] within their bounds, (4,) or (0,)."""
@@ -110,7 +143,8 @@ class GaitSolver:
         """Return the numbers of a stage."""
         friction = self.config.bounds.friction
         shared = self.gait.shared_values(weights, friction, orthosis_share)
-        return ProblemNumbers(shared, table, lambda i, at: self.stride.coordinates(i, at))
+        reference = self.stride.coordinates
+        return ProblemNumbers(shared, table, lambda i, at: reference(i, at), self.samples)
 
     def stage(
         self,
@@ -173,6 +207,7 @@ class GaitSolver:
             motion = replace(motion, parameters=self.stiffness_guess())
             settings = self._settings(loose or solver.tolerance, solver.first_barrier)
         else:
+            warm_start = replace(warm_start, phases=warm_start.phases[: len(self.gait.phases)])
             kept = config.mesh.refinements > 0
             motion = warm_start if kept else self._on_first_mesh(warm_start)
             settings = self._settings(loose or solver.tolerance, solver.warm_barrier)
@@ -193,8 +228,9 @@ class GaitSolver:
         config, stride = self.config, self.stride
         stiffness = _FADED * self.stiffness_guess()
         table = tracking_bounds(self.bounds, stride.durations, stiffness)
-        meshes = meshing.first(stride.durations, config.mesh)
-        motion = stride.motion(self.walker, stiffness, meshes, config.mesh.degree)
+        meshes = meshing.first(stride.durations[: len(self.gait.phases)], config.mesh)
+        costs = len(self.gait.integrals)
+        motion = stride.motion(self.walker, stiffness, meshes, config.mesh.degree, costs)
         settings = self._settings(_TRACKING_TOLERANCE, _TRACKING_BARRIER)
         numbers = self.numbers(_TRACKING, table, _FADED)
         return self.stage("tracking", motion, numbers, settings)
@@ -235,7 +271,6 @@ class GaitSolver:
         solver = self.config.solver
         barrier = max(_BARRIER_SHARE * tolerance, solver.refined_barrier)
         near = self._settings(solver.tolerance, barrier, warm=True)
-        near = replace(near, max_iterations=min(_NEAR_ITERATIONS, solver.max_iterations))
         program, result = self.stage(name, start, numbers, near, before)
         if result.converged or self._interrupted:
             return program, result
@@ -261,6 +296,7 @@ class GaitSolver:
         if result.converged and mesh.refinements and not _within(errors, tolerances):
             status = "the mesh does not reach the accuracy asked for"
         motion = program.to_motion(result.unknowns)
+        motion = full_stride(motion) if self.config.half_cycle else motion
         return GaitSolution(
             config=self.config,
             walker=self.walker,
@@ -269,7 +305,7 @@ class GaitSolver:
             nlp=result,
             bounds=self.bounds,
             cost=result.objective,
-            cost_terms=self._cost_terms(motion),
+            cost_terms=cost_terms(motion, self.weights, self.samples),
             violations=largest_violations(program, result),
             active=active_bounds(program, result),
             reintegration=errors,
@@ -277,18 +313,6 @@ class GaitSolver:
             stages=tuple(self.stages),
             seconds=dict(self.seconds),
         )
-
-    def _cost_terms(self, motion: PhasedMotion) -> dict[str, float]:
-        """Return the terms of the objective, equations (9) and (10)."""
-        effort, rate, acceleration = motion.phases[-1].integrals[-1][:3]
-        distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
-        weights = self.weights
-        return {
-            "effort_per_distance": float(weights.effort * effort / distance),
-            "rate_regularisation": float(weights.rate * rate / distance),
-            "acceleration_regularisation": float(weights.acceleration * acceleration / distance),
-            "walking_speed": float(-weights.walking_speed * distance / motion.duration),
-        }
 
 
 def _within(errors: Reintegration, tolerances: tuple[float, float]) -> bool:

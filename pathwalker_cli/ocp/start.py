@@ -19,7 +19,13 @@ from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_tim
 from pathwalker_cli.ocp.stylised import StylisedGait, stylised_trajectory
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["ReferenceStride", "recorded_stride", "reference_stride", "stylised_stride"]
+__all__ = [
+    "ReferenceStride",
+    "recorded_stride",
+    "reference_stride",
+    "start_recording",
+    "stylised_stride",
+]
 
 _EVENTS = (
     ("left", "toe_off"),
@@ -61,7 +67,12 @@ class ReferenceStride:
         return np.asarray(self._spline(time, order))
 
     def motion(
-        self, walker: Walker, stiffness: np.ndarray, meshes: tuple[np.ndarray, ...], degree: int
+        self,
+        walker: Walker,
+        stiffness: np.ndarray,
+        meshes: tuple[np.ndarray, ...],
+        degree: int,
+        integrals: int = len(INTEGRALS),
     ) -> PhasedMotion:
         """Return a start on a mesh: this stride, level activations, weight on the feet.
 
@@ -70,11 +81,16 @@ class ReferenceStride:
             stiffness: Start of the stiffnesses [N m/rad], shape (4,) or empty.
             meshes: Node positions of every phase.
             degree: Number of collocation points in an interval.
+            integrals: Number of running costs.
         """
-        phases = tuple(self._phase(walker, i, mesh, degree) for i, mesh in enumerate(meshes))
+        phases = tuple(
+            self._phase(walker, i, mesh, degree, integrals) for i, mesh in enumerate(meshes)
+        )
         return PhasedMotion(phases, np.asarray(stiffness, float))
 
-    def _phase(self, walker: Walker, i: int, mesh: np.ndarray, degree: int) -> PhaseMotion:
+    def _phase(
+        self, walker: Walker, i: int, mesh: np.ndarray, degree: int, integrals: int
+    ) -> PhaseMotion:
         contact, count = PHASES[i], len(mesh)
         points = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation_times(degree)
         loads = [CONTACT_FORCES[k].endswith("z") for k in contact.indices]
@@ -93,7 +109,7 @@ class ReferenceStride:
             states=states(mesh),
             smooth=np.full((count, len(GENERATORS)), 0.2),
             controls=np.zeros((count, len(GENERATORS))),
-            integrals=np.zeros((count, len(INTEGRALS))),
+            integrals=np.zeros((count, integrals)),
             inner_states=states(points),
             algebraic=algebraic,
         )
@@ -111,10 +127,19 @@ def reference_stride(walker: Walker, config: StartConfig, walking_speed: float) 
         DataError: If a recorded start was asked for and there is none.
     """
     if config.gait == "recorded":
-        names = recording_names(walker.patient, config.condition)
-        trial = config.trial or _first_with_stride(walker, config, names)
-        return recorded_stride(walker, read_recording(walker.patient, config.condition, trial))
+        return recorded_stride(walker, start_recording(walker, config))
     return stylised_stride(walker, walking_speed, config.knee_flexion, config.stride_ratio)
+
+
+def start_recording(walker: Walker, config: StartConfig) -> CompactRecording:
+    """Return the recording that a config names, or the first one that holds a whole stride.
+
+    Raises:
+        DataError: If there is none.
+    """
+    names = recording_names(walker.patient, config.condition)
+    trial = config.trial or _first_with_stride(walker, config, names)
+    return read_recording(walker.patient, config.condition, trial)
 
 
 def stylised_stride(

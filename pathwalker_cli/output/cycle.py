@@ -15,6 +15,8 @@ from pathwalker_cli.ocp.series import GaitSeries
 
 __all__ = [
     "BOTH_SIDES",
+    "STRIKE_PHASE",
+    "TOE_OFF_PHASE",
     "OwnCycle",
     "foot_strike_time",
     "own_cycle",
@@ -26,9 +28,12 @@ __all__ = [
 BOTH_SIDES: Final[tuple[Side, Side]] = (SIDES[0], SIDES[1])
 """`conventions.SIDES` as what they are to a type checker."""
 
-_STRIKE: Final[dict[Side, str]] = {"right": "left_toe_right_heel", "left": "right_toe_left_heel"}
+STRIKE_PHASE: Final[dict[Side, str]] = {
+    "right": "left_toe_right_heel",
+    "left": "right_toe_left_heel",
+}
 """Phase that begins with the foot strike of a side."""
-_TOE_OFF: Final[dict[Side, str]] = {"right": "left_flat", "left": "right_flat"}
+TOE_OFF_PHASE: Final[dict[Side, str]] = {"right": "left_flat", "left": "right_flat"}
 """Phase that begins with the toe-off of a side."""
 
 
@@ -49,12 +54,12 @@ def switching_times(series: GaitSeries) -> np.ndarray:
 
 def foot_strike_time(series: GaitSeries, side: Side) -> float:
     """Return when the heel of a side strikes the ground [s]."""
-    return float(switching_times(series)[PHASE_NAMES.index(_STRIKE[side])])
+    return float(switching_times(series)[PHASE_NAMES.index(STRIKE_PHASE[side])])
 
 
 def toe_off_time(series: GaitSeries, side: Side) -> float:
     """Return when the toe of a side leaves the ground [s]."""
-    return float(switching_times(series)[PHASE_NAMES.index(_TOE_OFF[side])])
+    return float(switching_times(series)[PHASE_NAMES.index(TOE_OFF_PHASE[side])])
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
-from pathwalker_cli.ocp.gait import INTEGRALS
+from pathwalker_cli.ocp.gait import INTEGRALS, PASSAGE_INTEGRALS
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
 __all__ = ["read_motion", "write_motion"]
@@ -104,13 +104,15 @@ def _shapes(phase: PhaseMotion) -> dict[str, tuple[int, ...]]:
     n, nodes = len(COORDINATES), max(2, phase.mesh.size)
     inner = phase.inner_states.shape
     degree = inner[1] if len(inner) == 3 else 1
+    width = phase.integrals.shape[-1] if phase.integrals.ndim else 0
+    costs = width if width == len(PASSAGE_INTEGRALS) else len(INTEGRALS)
     forces = len(phase_named(phase.name).indices)
     return {
         "mesh": (nodes,),
         "states": (nodes, 2 * n),
         "smooth": (nodes, len(GENERATORS)),
         "controls": (nodes, len(GENERATORS)),
-        "integrals": (nodes, len(INTEGRALS)),
+        "integrals": (nodes, costs),
         "inner_states": (nodes - 1, degree, 2 * n),
         "algebraic": (nodes - 1, degree, 2 * n + forces),
     }

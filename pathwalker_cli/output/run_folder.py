@@ -272,4 +272,10 @@ def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
             where=f"--warm-start {folder}",
             allowed=f"a run of the {config.condition} condition",
         )
+    if run.config.fits != config.fits:
+        raise DataError(
+            f"is a run of {run.config.problem}, which is no start for {config.problem}",
+            where=f"--warm-start {folder}",
+            allowed="fits start from fits, predictions from predictions",
+        )
     return run

@@ -20,7 +20,7 @@ from pathwalker_cli.output.figures.joint_moments import joint_moments
 from pathwalker_cli.output.figures.stick_figures import stick_figures
 from pathwalker_cli.output.figures.style import STYLE
 
-__all__ = ["FIGURES", "figure_names", "make_figure", "save_figures"]
+__all__ = ["FIGURES", "figure_names", "make_figure", "save_figure", "save_figures"]
 
 DPI: Final = 200
 """Dots per inch of the PNG files."""
@@ -82,12 +82,19 @@ def save_figures(
         figure = make_figure(name, series, reference)
         for extension in formats:
             saved.append(f"{name}.{extension}")
-            _save(figure, folder / saved[-1], extension)
+            save_figure(figure, folder / saved[-1])
     return tuple(saved)
 
 
-def _save(figure: Figure, path: Path, extension: str) -> None:
-    """Save a figure in one stroke; its layout is settled by the first format."""
+def save_figure(figure: Figure, path: str | Path) -> None:
+    """Save a figure in one stroke; its layout is settled by the first format.
+
+    Args:
+        figure: A figure made under `style.STYLE`.
+        path: The file, ".png" or ".svg".
+    """
+    path = Path(path)
+    extension = path.suffix.removeprefix(".")
     with mpl.rc_context(STYLE), atomic_path(path) as temporary:
         figure.savefig(temporary, format=extension, dpi=DPI, metadata=_METADATA[extension])
     figure.set_layout_engine("none")

@@ -1,0 +1,46 @@
+"""The terms of the objective, equations (8), (9) and (10), evaluated on a motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathwalker_cli.conventions import COORDINATES
+from pathwalker_cli.ocp.gait import INTEGRALS, GaitWeights
+from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.ocp.problem import Sample
+
+__all__ = ["cost_terms"]
+
+
+def cost_terms(
+    motion: PhasedMotion, weights: GaitWeights, samples: tuple[Sample, ...] = ()
+) -> dict[str, float]:
+    """Return the terms of the objective by name; they add up to the cost.
+
+    Args:
+        motion: A whole stride.
+        weights: Weights of the terms.
+        samples: Recorded instants of a passage; without them the stride is a prediction.
+    """
+    totals = motion.phases[-1].integrals[-1]
+    effort, rate, acceleration = totals[:3]
+    distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
+    terms = {
+        "effort_per_distance": weights.effort * effort / distance,
+        "rate_regularisation": weights.rate * rate / distance,
+        "acceleration_regularisation": weights.acceleration * acceleration / distance,
+        "walking_speed": -weights.walking_speed * distance / motion.duration,
+    }
+    if samples:
+        terms["fit"] = weights.fit * squared_distance(motion, samples)
+        terms["excitation_regularisation"] = weights.excitation * totals[len(INTEGRALS)]
+    return {name: float(value) for name, value in terms.items()}
+
+
+def squared_distance(motion: PhasedMotion, samples: tuple[Sample, ...]) -> float:
+    """Return the sum over instants and coordinates of (q - q_recorded)^2 [rad^2 and m^2]."""
+    total = 0.0
+    for sample in samples:
+        state = motion.phases[sample.phase].states_at(np.array([sample.fraction]))[0]
+        total += float(np.sum((state[: len(COORDINATES)] - sample.data) ** 2))
+    return total
