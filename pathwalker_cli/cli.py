@@ -25,6 +25,11 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "solve_command",
         "Predict the gait of a patient by optimal control.",
     ),
+    "evaluate": (
+        "pathwalker_cli.commands.evaluate",
+        "evaluate_command",
+        "Compare predicted gait with the recordings of the patient.",
+    ),
     "model": (
         "pathwalker_cli.commands.model",
         "model_command",

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from pathwalker_cli.conventions import COORDINATES, Condition
+from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, Condition
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.io.yaml_file import read_mapping, read_value, validate
@@ -149,6 +149,17 @@ class StartConfig(YamlModel):
     condition: Condition = "barefoot"
     knee_flexion: Annotated[float, Quantity("rad", 0.05, 1.5, above="is it in degrees?")] = 0.7
     stride_ratio: Annotated[float, Quantity("leg lengths", 0.3, 3.0)] = 1.1
+    walking_speed: Speed | None = None
+    stiffness: dict[str, Stiffness] = Field(default_factory=dict)
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    @field_validator("stiffness")
+    @classmethod
+    def _stiffnesses(cls, value: dict[str, float]) -> dict[str, float]:
+        for name in value:
+            if name not in STIFFNESSES:
+                raise invalid(f"names '{name}'", allowed=", ".join(STIFFNESSES))
+        return value
 
 
 class SolverConfig(YamlModel):
@@ -176,14 +187,17 @@ class StudyConfig(YamlModel):
     start: StartConfig = StartConfig()
     solver: SolverConfig = SolverConfig()
     half_cycle: bool = False
+    starts: Annotated[int, Field(ge=1, le=1000)] = 1
     smoke: bool = False
 
     @model_validator(mode="before")
     @classmethod
     def _defaults(cls, value: Any) -> Any:
         """Let the defaults of the problem stand where the config is silent."""
-        problem = PROBLEMS.get(str(value.get("problem"))) if isinstance(value, dict) else None
-        return value if problem is None else merged(problem.defaults, value)
+        if not isinstance(value, dict) or value.get("problem") not in PROBLEMS:
+            return value
+        defaults = PROBLEMS[str(value["problem"])].defaults
+        return merged(defaults, value)
 
     @field_validator("problem")
     @classmethod
@@ -223,8 +237,10 @@ def merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     result = dict(under)
     for key, value in over.items():
         below = result.get(key)
-        both = isinstance(below, Mapping) and isinstance(value, Mapping)
-        result[key] = merged(below, value) if both else value
+        if isinstance(below, Mapping) and isinstance(value, Mapping):
+            result[key] = merged(below, value)
+        else:
+            result[key] = value
     return result
 
 

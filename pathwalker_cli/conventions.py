@@ -58,6 +58,11 @@ GENERATORS: Final = (
 """Muscle torque generators in order. As in the published model, `lumbar_extension` (the stronger
 one) bends the trunk forward (torque sign +) and `lumbar_flexion` extends it."""
 
+STIFFNESSES: Final = tuple(
+    f"{kind}_stiffness_{side}" for kind in ("dorsiflexion", "plantarflexion") for side in SIDES
+)
+"""Free orthosis parameters in order: K_D right, left, K_P right, left [N m/rad]."""
+
 CONTACT_POINTS: Final = ("heel_r", "toe_r", "heel_l", "toe_l")
 CONTACT_FORCES: Final = (
     "heel_r_x",

@@ -94,7 +94,7 @@ def test_wrong_usage_exits_with_2() -> None:
     assert run("solve", "mapd-orthosis", "mapd-orthosis", "--nonsense").exit_code == 2
     result = run("slove")
     assert result.exit_code == 2
-    assert "there is no command 'slove'; allowed: solve, model, import" in result.output
+    assert "there is no command 'slove'; allowed: solve, evaluate, model, import" in result.output
 
 
 # Bad input
@@ -172,7 +172,7 @@ BAD_CONFIGS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     ),
     "unknown problem in the file": (
         lambda f: config_of(f, problem="mapd"),
-        ("problem", "is 'mapd'", "mapd-orthosis, mapd-barefoot"),
+        ("problem", "is 'mapd'", "mapd-barefoot, mapd-orthosis"),
     ),
     "unknown patient": (
         lambda f: config_of(f, patient="nobody"),
@@ -205,7 +205,10 @@ def refused(folder: Path, result: Result, parts: tuple[str, ...]) -> None:
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
-        (["mapd-shoes", "mapd-orthosis"], ("no problem 'mapd-shoes'", "mapd-orthosis, mapd-bare")),
+        (
+            ["mapd-shoes", "mapd-orthosis"],
+            ("no problem 'mapd-shoes'", "mapd-barefoot, mapd-orthosis"),
+        ),
         (["mapd-barefoot", "mapd-orthosis"], ("is a config for mapd-orthosis",)),
         (["mapd-orthosis", "mapd-orthosis", "--set", "nonsense"], ("--set", "dotted.key=value")),
         (["mapd-orthosis", "mapd-orthosis", "--set", "mesh.degre=3"], ("degre", "degree")),

@@ -22,9 +22,11 @@ LAYERS = (
     {"patient"},
     {"io.recordings"},
     {"model"},
+    {"problems"},
     {"config"},
     {"ocp", "inverse"},
     {"output"},
+    {"evaluation"},
     {"commands"},
     {"cli"},
 )
@@ -36,7 +38,7 @@ APART = ({"ocp", "inverse"},)
 CONFINED = {
     "casadi": ("model", "ocp", "commands.doctor"),
     "pinocchio": ("model", "ocp", "inverse", "output.figures.stick_figures"),
-    "matplotlib": ("output.figures", "output.recorded_figures"),
+    "matplotlib": ("output.figures", "output.recorded_figures", "evaluation.figures"),
     "click": ("cli", "commands"),
     "rich": ("commands", "output"),
     "ezc3d": ("io",),

@@ -12,6 +12,7 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from pathwalker_cli.ocp.ipopt import ProgressReport
+    from pathwalker_cli.ocp.solution import LocalOptimum
 
 __all__ = ["Progress"]
 
@@ -78,6 +79,16 @@ class Progress:
             self._redraw(now)
         elif report.iteration % EVERY == 0:
             self._print()
+
+    def optimum(self, found: LocalOptimum) -> None:
+        """Take note of where one of several starts ended."""
+        self._end_stage()
+        self._last = (
+            f"start {found.start:<3d} {found.status}, cost {found.cost:.5g}, "
+            f"{found.walking_speed:.3f} m/s, {found.iterations} iterations, {found.description}"
+        )
+        self.lines.append(self._last)
+        self._print()
 
     def _redraw(self, now: float) -> None:
         if self._live is not None and now - self._drawn >= PAUSE:

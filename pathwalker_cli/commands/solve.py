@@ -103,7 +103,10 @@ def _study(
 def _solve(study: StudyConfig, earlier: Run | None, progress: Progress) -> GaitSolution:
     """Solve a study, from an earlier run if there is one."""
     from pathwalker_cli.ocp.solve import GaitSolver
+    from pathwalker_cli.ocp.starts import solve_from_starts
 
+    if study.starts > 1 and earlier is None:
+        return solve_from_starts(study, progress.optimum)
     return GaitSolver(study, progress).solve(None if earlier is None else earlier.motion)
 
 
@@ -126,7 +129,7 @@ def _report(solution: GaitSolution, metrics: dict[str, Any], folder: Path) -> No
     from rich.console import Console
 
     from pathwalker_cli.output.run_metrics import stiffness_ranges
-    from pathwalker_cli.output.solve_text import detail_lines, source_lines
+    from pathwalker_cli.output.solve_text import detail_lines, optimum_lines, source_lines
     from pathwalker_cli.output.text import active_bounds, summary, summary_renderable
 
     bounds = active_bounds(metrics, stiffness_ranges(solution)) if solution.converged else ()
@@ -136,7 +139,7 @@ def _report(solution: GaitSolution, metrics: dict[str, Any], folder: Path) -> No
     else:
         click.echo(summary(metrics, solution.status, solution.cost, bounds))
     click.echo()
-    rows = detail_lines(solution, metrics)
+    rows = [*optimum_lines(solution.optima), *detail_lines(solution, metrics)]
     rows += [("bounds", line) for line in source_lines(solution.bounds.sources)]
     rows += [("patient", note) for note in solution.walker.patient.notes]
     for label, text in rows:

@@ -22,6 +22,7 @@ from pathwalker_cli.conventions import (
     COORDINATES,
     GENERATORS,
     SIDES,
+    STIFFNESSES,
 )
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 from pathwalker_cli.model.curves import BezierChain, evaluate
@@ -54,10 +55,6 @@ ACCELERATIONS: Final = tuple(f"{name}_acceleration" for name in COORDINATES)
 RESERVES: Final = tuple(f"{name}_reserve" for name in COORDINATES)
 ACTIVATIONS: Final = tuple(f"{name}_activation" for name in GENERATORS)
 RATES: Final = tuple(f"{name}_rate" for name in GENERATORS)
-STIFFNESSES: Final = tuple(
-    f"{kind}_stiffness_{side}" for kind in ("dorsiflexion", "plantarflexion") for side in SIDES
-)
-"""Free orthosis parameters in order: K_D right, left, K_P right, left [N m/rad]."""
 INTEGRALS: Final = ("effort", "rate", "acceleration", "tracking", "reserve")
 """Running costs: the sums of a^2, (rate / 20)^2, (vdot / 50)^2, (q - q_ref)^2 and
 (reserve / 20)^2."""

@@ -7,11 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from pathwalker_cli.config import BoundsConfig
-from pathwalker_cli.conventions import CONTACT_FORCES, CONTACT_POINTS, COORDINATES, GRAVITY
+from pathwalker_cli.conventions import (
+    CONTACT_FORCES,
+    CONTACT_POINTS,
+    COORDINATES,
+    GRAVITY,
+    STIFFNESSES,
+)
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.ocp.gait import ACTIVATIONS, RESERVES, STIFFNESSES, VELOCITIES
+from pathwalker_cli.ocp.gait import ACTIVATIONS, RESERVES, VELOCITIES
 from pathwalker_cli.ocp.problem import INFINITY, BoundTable
 
 __all__ = ["GaitBounds", "gait_bounds", "recorded_durations", "tracking_bounds"]

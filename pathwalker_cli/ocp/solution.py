@@ -19,7 +19,7 @@ from pathwalker_cli.ocp.verify import (
     second_engine_residual,
 )
 
-__all__ = ["GaitSolution", "StageRecord"]
+__all__ = ["GaitSolution", "LocalOptimum", "StageRecord"]
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,36 @@ class StageRecord:
 
 
 @dataclass(frozen=True)
+class LocalOptimum:
+    """Where one of several starts ended.
+
+    Args:
+        start: Number of the start; 0 is the study's own.
+        description: The start in words.
+        status: "converged" or the reason why not.
+        cost: Value of the objective.
+        walking_speed: Walking speed [m/s].
+        stiffness: K_D right, left, K_P right, left [N m/rad]; empty when barefoot.
+        iterations: Iterations over all stages.
+        seconds: Wall seconds.
+    """
+
+    start: int
+    description: str
+    status: str
+    cost: float
+    walking_speed: float
+    stiffness: tuple[float, ...]
+    iterations: int
+    seconds: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether it is a solution."""
+        return self.status == "converged"
+
+
+@dataclass(frozen=True)
 class GaitSolution:
     """The end of a solve, converged or not.
 
@@ -66,6 +96,7 @@ class GaitSolution:
         start: Where the search began.
         stages: The stages.
         seconds: Wall seconds by part: build, solve, verify.
+        optima: Where all starts ended, best first; empty for a single start.
     """
 
     config: StudyConfig
@@ -82,6 +113,7 @@ class GaitSolution:
     start: str
     stages: tuple[StageRecord, ...]
     seconds: dict[str, float]
+    optima: tuple[LocalOptimum, ...] = ()
 
     @property
     def converged(self) -> bool:

@@ -10,12 +10,13 @@ from functools import cached_property
 import numpy as np
 
 from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationBlocks, CollocationProgram
 from pathwalker_cli.ocp.cost_terms import cost_terms
-from pathwalker_cli.ocp.gait import STIFFNESSES, Form, GaitProblem, GaitWeights
+from pathwalker_cli.ocp.gait import Form, GaitProblem, GaitWeights
 from pathwalker_cli.ocp.gait_bounds import gait_bounds, recorded_durations, tracking_bounds
 from pathwalker_cli.ocp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
 from pathwalker_cli.ocp.multipliers import transferred
@@ -120,8 +121,13 @@ class GaitSolver:
         start = self.config.start
         if self.config.fits:
             return recorded_passage(self.walker, start_recording(self.walker, start))
-        speed = self.bounds.table.entries[("walking_speed",)][0]
-        return reference_stride(self.walker, start, speed)
+        return reference_stride(self.walker, start, self.start_speed)
+
+    @property
+    def start_speed(self) -> float:
+        """Speed of a synthetic start [m/s]: the config's, or the least speed allowed."""
+        least = self.bounds.table.entries[("walking_speed",)][0]
+        return self.config.start.walking_speed or least
 
     @cached_property
     def samples(self) -> tuple[Sample, ...]:
@@ -133,7 +139,8 @@ class GaitSolver:
         if self.walker.orthosis is None:
             return np.zeros(0)
         guess = self.walker.patient.require_orthosis().stiffness_guess
-        values = [getattr(guess, name.split("_")[0]) for name in STIFFNESSES]
+        given = self.config.start.stiffness
+        values = [given.get(name, getattr(guess, name.split("_")[0])) for name in STIFFNESSES]
         lower, upper = self.bounds.table.arrays(STIFFNESSES)
         return np.clip(values, lower, upper)
 
@@ -215,6 +222,13 @@ class GaitSolver:
             program, result = self.stage("first mesh", motion, numbers, settings)
         program, result, errors = self._refine(program, result, settings.tolerance)
         return self._finish(program, result, errors, warm_start is not None)
+
+    def restored(self, result: NlpResult, meshes: tuple[np.ndarray, ...]) -> GaitSolution:
+        """Return the solution that another process found on these meshes."""
+        numbers = self.numbers(self.weights, self.bounds.table)
+        program = CollocationProgram(self.blocks, numbers, meshes)
+        errors = self._reintegrated(program.to_motion(result.unknowns))
+        return self._finish(program, result, errors, False)
 
     def _on_first_mesh(self, motion: PhasedMotion) -> PhasedMotion:
         mesh = self.config.mesh

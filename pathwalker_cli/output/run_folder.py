@@ -16,8 +16,8 @@ import numpy as np
 import yaml
 
 from pathwalker_cli.config import StudyConfig, load_config
+from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError, NotConvergedError
-from pathwalker_cli.ocp.gait import STIFFNESSES
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.ocp.solution import GaitSolution

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.ocp.gait import STIFFNESSES
+from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output.metrics import gait_metrics
 from pathwalker_cli.output.versions import versions
@@ -119,6 +119,7 @@ def _effort(solution: GaitSolution) -> dict[str, Any]:
         "intervals": solution.last_motion.intervals,
         "iterations": solution.iterations,
         "stages": [asdict(stage) for stage in solution.stages],
+        "local_optima": [asdict(optimum) for optimum in solution.optima],
         "seconds_build": solution.seconds["build"],
         "seconds_solve": solution.seconds["solve"],
     }

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, to_degrees
-from pathwalker_cli.ocp.gait import STIFFNESSES
-from pathwalker_cli.ocp.solution import GaitSolution
+from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, to_degrees
+from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.ocp.verify import ActiveBound
 
-__all__ = ["bound_lines", "detail_lines", "failure_text", "interesting", "source_lines"]
+__all__ = [
+    "bound_lines",
+    "detail_lines",
+    "failure_text",
+    "interesting",
+    "optimum_lines",
+    "source_lines",
+]
 
 _ANGLES: Final = frozenset(COORDINATES[2:])
 _UNITS: Final = {"duration": "s", "walking_speed": "m/s", "distance": "m"}
@@ -73,6 +79,28 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
         ("dynamics, start", f"{solution.walker.backend}, {solution.start}"),
     ]
     return [*rows, *(("active bound", line) for line in bound_lines(solution))]
+
+
+def optimum_lines(optima: Sequence[LocalOptimum]) -> list[tuple[str, str]]:
+    """Return label and text of every local optimum, best first, and how far they lie apart."""
+    lines = []
+    for found in optima:
+        springs = ", ".join(f"{value:.1f}" for value in found.stiffness)
+        text = f"start {found.start}: cost {found.cost:.5g}, {found.walking_speed:.3f} m/s"
+        text += f", K_D r l, K_P r l {springs} N m/rad" if springs else ""
+        lines.append(("local optimum", text if found.converged else f"{text}, {found.status}"))
+    costs = [found.cost for found in optima if found.converged]
+    if len(costs) > 1:
+        near = sum(cost <= costs[0] + 0.05 * abs(costs[0]) for cost in costs)
+        spread = (costs[-1] - costs[0]) / abs(costs[0])
+        lines.append(
+            (
+                "local optima",
+                f"{len(costs)} of {len(optima)} starts converged, {near} within 5 % of the best; "
+                f"the worst is {100 * spread:.1f} % above",
+            )
+        )
+    return lines
 
 
 def source_lines(sources: Mapping[str, str]) -> list[str]:

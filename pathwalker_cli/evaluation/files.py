@@ -1,0 +1,123 @@
+"""An evaluation as `evaluation.json` and `evaluation.csv`: SI units and radians."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from pathwalker_cli.evaluation.evaluate import Change, Evaluation, Row
+from pathwalker_cli.evaluation.paper import PaperClaim, PaperNumber
+from pathwalker_cli.io.atomic import atomic_open
+
+__all__ = ["evaluation_content", "json_text", "write_csv"]
+
+_COLUMNS: Final = (
+    "run",
+    "quantity",
+    "unit",
+    "value",
+    "recorded_mean",
+    "recorded_min",
+    "recorded_max",
+    "recorded_count",
+    "position",
+    "paper",
+)
+
+
+def evaluation_content(
+    evaluations: Sequence[Evaluation], changes: Sequence[Change] = ()
+) -> dict[str, Any]:
+    """Return everything that was evaluated, ready for JSON.
+
+    Args:
+        evaluations: One or more gaits beside the recordings.
+        changes: Changes from barefoot to orthosis.
+    """
+    return {
+        "runs": [_run(each) for each in evaluations],
+        "changes": {change.quantity.key: _change(change) for change in changes},
+    }
+
+
+def json_text(content: dict[str, Any]) -> str:
+    """Return the content of `evaluation_content` as JSON."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_csv(path: str | Path, evaluations: Iterable[Evaluation]) -> None:
+    """Write one row per run and quantity; empty cells for what is not known."""
+    with atomic_open(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_COLUMNS)
+        for each in evaluations:
+            writer.writerows(_cells(each.gait.name, row) for row in each.rows)
+
+
+def _run(evaluation: Evaluation) -> dict[str, Any]:
+    """Return one gait and its quantities."""
+    gait, recorded = evaluation.gait, evaluation.recorded
+    return {
+        "name": gait.name,
+        "problem": gait.problem,
+        "patient": gait.walker.patient.id,
+        "condition": gait.walker.condition,
+        "recordings": [trial.name for trial in recorded.trials] if recorded else [],
+        "one_trial": evaluation.one_trial,
+        "notes": list(evaluation.notes),
+        "quantities": {row.quantity.key: _row(row) for row in evaluation.rows},
+    }
+
+
+def _row(row: Row) -> dict[str, Any]:
+    """Return one quantity."""
+    return {
+        "value": row.value,
+        "unit": row.quantity.unit,
+        "recorded": None if row.recorded is None else asdict(row.recorded),
+        "position": row.position,
+        "paper": _paper(row.paper),
+        "paper_recorded": _paper(row.paper_recorded),
+    }
+
+
+def _change(change: Change) -> dict[str, Any]:
+    """Return one change."""
+    return {
+        "barefoot": change.barefoot,
+        "orthosis": change.orthosis,
+        "change": change.value,
+        "unit": change.quantity.unit,
+        "recorded": change.recorded,
+        "paper": _paper(change.paper),
+    }
+
+
+def _paper(printed: PaperNumber | PaperClaim | None) -> dict[str, Any] | None:
+    """Return what the article prints: the value in SI units, and as it stands there."""
+    if printed is None:
+        return None
+    found: dict[str, Any] = {"printed": str(printed), "place": printed.place}
+    if isinstance(printed, PaperNumber):
+        low, high = printed.bounds
+        found |= {"value": printed.value, "min": low, "max": high}
+        found |= {"printed_unit": printed.unit, "note": printed.note}
+    return found
+
+
+def _cells(run: str, row: Row) -> list[Any]:
+    """Return the cells of a row of the CSV file."""
+    spread = row.recorded
+    recorded = (spread.mean, spread.low, spread.high, spread.count) if spread else (None,) * 4
+    value = None if row.paper is None else row.paper.value
+    return [run, row.quantity.key, row.quantity.unit, *map(_text, (row.value, *recorded)),
+            row.position or "", _text(value)]  # fmt: skip
+
+
+def _text(value: float | None) -> str:
+    """Return a number as text, "" for none."""
+    return "" if value is None else f"{value:.9g}"

@@ -1,0 +1,122 @@
+"""The quantities of one gait by itself, and of the recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pathwalker_cli.conventions import GENERATORS, SUFFIX, Side
+from pathwalker_cli.evaluation.ankle import ankle_line, ankle_profile, recorded_ankle_profiles
+from pathwalker_cli.evaluation.gait import Gait
+from pathwalker_cli.evaluation.recorded import RecordedGait
+from pathwalker_cli.evaluation.spread import Spread, spread
+from pathwalker_cli.inverse.cycles import step_lengths, walking_speed
+from pathwalker_cli.inverse.filters import frame_rate
+from pathwalker_cli.inverse.forces import foot_extents
+from pathwalker_cli.output.cycle import BOTH_SIDES
+
+__all__ = ["gait_numbers", "recorded_numbers"]
+
+
+def gait_numbers(gait: Gait) -> dict[str, float]:
+    """Return what the gait says by itself, by key of `quantities.QUANTITIES`, SI units."""
+    found = {"walking_speed": gait.walking_speed, "stride_time": gait.duration}
+    if gait.effort is not None:
+        found["effort_per_distance"] = gait.effort / (gait.walking_speed * gait.duration)
+    for side in BOTH_SIDES:
+        knee = gait.column(f"knee_{SUFFIX[side]}")[gait.stance_rows(side)]
+        stance = gait.toe_off(side) - gait.strike(side)
+        found[f"step_length_{side}"] = gait.step_length(side)
+        found[f"stance_share_{side}"] = stance / gait.duration
+        found[f"min_stance_knee_flexion_{side}"] = float(knee.min())
+        found |= _loads(gait, side) | _muscles(gait, side) | _stiffness(gait, side)
+    return found
+
+
+def recorded_numbers(recorded: RecordedGait) -> dict[str, Spread]:
+    """Return mean and range of what recordings say, by key of `quantities.QUANTITIES`, SI units.
+
+    Walking speed is that of a trial; the other values are those of single steps, strides and
+    stances, forces and torques of measured ones only.
+    """
+    speeds = [walking_speed(trial.motion) for trial in recorded.trials]
+    strides = [
+        (cycle.end - cycle.start) / frame_rate(trial.motion)
+        for side in BOTH_SIDES
+        for trial, cycle in recorded.cycles(side)
+    ]
+    values: dict[str, Sequence[float]] = {"walking_speed": speeds, "stride_time": strides}
+    steps = _steps(recorded)
+    for side in BOTH_SIDES:
+        profiles = recorded_ankle_profiles(recorded, side)
+        up = recorded.stance_forces(side)[:, :, 1:].max(axis=(1, 2), initial=-np.inf)
+        values |= {
+            f"step_length_{side}": steps[side],
+            f"stance_share_{side}": [
+                (cycle.toe_off - cycle.start) / (cycle.end - cycle.start)
+                for _, cycle in recorded.cycles(side)
+            ],
+            f"min_stance_knee_flexion_{side}": _least_knees(recorded, side),
+            f"peak_vertical_force_{side}": (up / recorded.walker.weight).tolist(),
+            f"ankle_torque_slope_stance_{side}": [ankle_line(profile)[0] for profile in profiles],
+            f"peak_net_ankle_torque_{side}": profiles[:, :, 1].max(axis=1).tolist(),
+        }
+    spreads = {key: spread(found) for key, found in values.items()}
+    return {key: found for key, found in spreads.items() if found is not None}
+
+
+def _loads(gait: Gait, side: Side) -> dict[str, float]:
+    """Return peak ground force and net ankle torque of a side, as far as they are known."""
+    found = {}
+    if gait.force is not None:
+        peak = float(gait.force[side][:, 1].max())
+        found[f"peak_vertical_force_{side}"] = peak / gait.walker.weight
+    profile = ankle_profile(gait, side)
+    if profile is not None:
+        found[f"ankle_torque_slope_stance_{side}"] = ankle_line(profile)[0]
+        found[f"peak_net_ankle_torque_{side}"] = float(profile[:, 1].max())
+    return found
+
+
+def _muscles(gait: Gait, side: Side) -> dict[str, float]:
+    """Return torque and activation of the ankle extensor of a side, as far as they are known."""
+    found = {}
+    index = GENERATORS.index(f"ankle_extension_{SUFFIX[side]}")
+    for name, values in (("torque", gait.muscle_torque), ("activation", gait.activation)):
+        if values is not None:
+            stem = f"ankle_extension_{name}_{side}"
+            found[f"peak_{stem}"] = float(values[:, index].max())
+            found[f"mean_{stem}"] = float(gait.mean(values[:, index]))
+    return found
+
+
+def _stiffness(gait: Gait, side: Side) -> dict[str, float]:
+    """Return the stiffnesses of the orthosis of a side, if there is one."""
+    if gait.stiffness is None:
+        return {}
+    first = BOTH_SIDES.index(side)
+    return {
+        f"dorsiflexion_stiffness_{side}": float(gait.stiffness[first]),
+        f"plantarflexion_stiffness_{side}": float(gait.stiffness[first + 2]),
+    }
+
+
+def _steps(recorded: RecordedGait) -> dict[Side, list[float]]:
+    """Return the lengths of all steps per side [m]."""
+    found: dict[Side, list[float]] = {side: [] for side in BOTH_SIDES}
+    for trial in recorded.trials:
+        feet = foot_extents(recorded.walker.model, trial.motion.values)
+        heels = {side: ends[:, 0] for side, ends in feet.items()}
+        for side, lengths in step_lengths(trial.events, heels, frame_rate(trial.motion)).items():
+            found[side] += lengths
+    return found
+
+
+def _least_knees(recorded: RecordedGait, side: Side) -> list[float]:
+    """Return the least knee flexion of every stance of a side [rad]."""
+    name = f"knee_{SUFFIX[side]}"
+    return [
+        float(trial.motion[name][stance.strike : stance.toe_off + 1].min())
+        for trial, stance in recorded.stances(side)
+    ]

@@ -1,0 +1,100 @@
+"""The recordings of one condition, cut into strides and stances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pathwalker_cli.conventions import SUFFIX, Side
+from pathwalker_cli.inverse.bands import resampled
+from pathwalker_cli.inverse.cycles import GaitCycle, Stance, stances
+from pathwalker_cli.inverse.evaluate import StudyTrial, recorded_trials
+from pathwalker_cli.inverse.study import InverseDynamicsConfig
+from pathwalker_cli.io.recordings import recording_names
+from pathwalker_cli.model.walker import Walker
+
+__all__ = ["RecordedGait", "recorded_gait"]
+
+
+@dataclass(frozen=True)
+class RecordedGait:
+    """All recordings of a patient in one condition.
+
+    Args:
+        walker: The patient's walker in that condition; it carries the weight.
+        trials: The trials with angles, events and, where measured, forces and torques.
+    """
+
+    walker: Walker
+    trials: tuple[StudyTrial, ...]
+
+    def trial(self, name: str) -> StudyTrial | None:
+        """Return the trial of this name, or None."""
+        return next((each for each in self.trials if each.name == name), None)
+
+    def cycles(self, side: Side) -> Iterator[tuple[StudyTrial, GaitCycle]]:
+        """Yield every complete gait cycle of a side with its trial."""
+        for trial in self.trials:
+            yield from ((trial, cycle) for cycle in trial.cycles if cycle.side == side)
+
+    def stances(self, side: Side) -> Iterator[tuple[StudyTrial, Stance]]:
+        """Yield every complete stance of a side with its trial, measured or not."""
+        for trial in self.trials:
+            yield from ((trial, each) for each in stances(trial.events) if each.side == side)
+
+    def stance_forces(self, side: Side) -> np.ndarray:
+        """Return (forward, up) over every measured stance [N], shape (stances, POINTS, 2)."""
+        found = [
+            resampled(_forces(trial, side)[item.stance.strike : item.stance.toe_off + 1])
+            for trial in self.trials
+            for item in trial.stances
+            if item.measured and item.stance.side == side and trial.forces is not None
+        ]
+        return _stacked(found)
+
+    def cycle_forces(self, side: Side) -> np.ndarray:
+        """Return (forward, up) over every cycle with a measured stance [N], (cycles, POINTS, 2)."""
+        found = []
+        for trial, cycle in self.cycles(side):
+            if trial.forces is not None:
+                curve = _forces(trial, side)[cycle.start : cycle.end + 1]
+                # At the next strike the foot is still in the air; what follows may not be measured.
+                found.append(resampled(np.vstack([curve[:-1], curve[-2:-1]])))
+        return _stacked(found)
+
+
+def recorded_gait(walker: Walker) -> RecordedGait | None:
+    """Return the recordings beside the patient's file in the walker's condition.
+
+    Args:
+        walker: The walker; its patient says where the recordings are.
+
+    Returns:
+        The recordings, or None if there are none.
+
+    Raises:
+        DataError: If a recording cannot be used.
+    """
+    patient, condition = walker.patient, walker.condition
+    if patient.folder is None or not recording_names(patient, condition):
+        return None
+    config = InverseDynamicsConfig(
+        study="inverse-dynamics", patient=patient.id, conditions=(condition,)
+    )
+    trials = recorded_trials(config, patient, condition, lambda _: None)
+    return RecordedGait(walker, tuple(trials))
+
+
+def _forces(trial: StudyTrial, side: Side) -> np.ndarray:
+    """Return (forward, up) on a foot in every frame [N], NaN where not measured, shape (n, 2)."""
+    if trial.forces is None:
+        raise ValueError(f"trial {trial.name} has no forces")
+    return np.stack([trial.forces[f"force_{SUFFIX[side]}_{axis}"] for axis in "xz"], axis=1)
+
+
+def _stacked(curves: list[np.ndarray]) -> np.ndarray:
+    """Return those curves that are known throughout, shape (curves, POINTS, 2)."""
+    known = [curve for curve in curves if np.isfinite(curve).all()]
+    return np.array(known) if known else np.empty((0, 0, 2))

@@ -1,0 +1,238 @@
+"""Direct multiple shooting: a shooting problem on a mesh becomes a nonlinear program.
+
+Every mesh interval is an initial value problem from its own node; the controls are linear in it.
+Error-controlled Runge-Kutta steps lead from node to node (`shooting_steps`), as rows of the program
+(`shooting_blocks`).  Bounds and path rows stand at the nodes.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from pathwalker_cli.ocp.blocks import Block, BlockProgram, Occurrences
+from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.ocp.problem import INFINITY, ProblemNumbers, Rows
+from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks
+from pathwalker_cli.ocp.shooting_layout import ShootingLayout
+from pathwalker_cli.ocp.shooting_motion import Edges, Shooter, ShootingNodes
+from pathwalker_cli.ocp.shooting_steps import CASH_KARP
+
+__all__ = ["ShootingProgram"]
+
+
+class ShootingProgram:
+    """A shooting problem with its numbers on one mesh and one choice of steps.
+
+    Args:
+        blocks: The blocks of the problem.
+        numbers: The numbers of the problem.
+        meshes: Node positions of every phase, from 0 to 1.
+        edges: Ends of the steps in every interval, from 0 to 1, by phase and interval.
+        rounding: How far kinks of the smooth states' equation are rounded off.
+    """
+
+    def __init__(
+        self,
+        blocks: ShootingBlocks,
+        numbers: ProblemNumbers,
+        meshes: tuple[np.ndarray, ...],
+        edges: Edges,
+        rounding: float = 0.0,
+    ) -> None:
+        self.blocks = blocks
+        self.numbers = numbers
+        self.meshes = meshes
+        self.edges = edges
+        self.rounding = rounding
+        self.layout = ShootingLayout.make(blocks.shooting, edges)
+        occurrences = [self._boundary_rows()]
+        for i in range(len(meshes)):
+            occurrences += [self._residual_rows(i), self._step_rows(i), self._path_rows(i)]
+            occurrences.append(self._end_rows(i))
+        shared = blocks.problem.shared.numel()
+        self.program = BlockProgram(self.layout.size, occurrences, shared)
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Parameter vector of the nonlinear program."""
+        return self.program.parameters(self.numbers.shared)
+
+    @cached_property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled lower and upper bounds of all unknowns."""
+        return self.layout.bounds(self.blocks.shooting, self.numbers.bounds)
+
+    def _row_bounds(
+        self, rows: Rows, count: int, phase: str = "", at_end: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return scaled bounds of rows, from the numbers where they have an entry, (r, count)."""
+        lower, upper = rows.lower.copy(), rows.upper.copy()
+        for k, name in enumerate(rows.names):
+            found = self.numbers.bounds.find(name, phase, at_end)
+            if found is not None:
+                lower[k], upper[k] = found
+        low, high = (np.tile((k / rows.scale)[:, None], count) for k in (lower, upper))
+        return low, high
+
+    def _occurrences(
+        self,
+        block: Block,
+        rows: Rows,
+        columns: np.ndarray,
+        bounds: tuple[np.ndarray, np.ndarray],
+        labels: list[str],
+    ) -> Occurrences:
+        """Return a block without data at these columns."""
+        data = np.zeros((0, columns.shape[1]))
+        lower, upper = bounds
+        return Occurrences(block, columns, data, lower, upper, rows.scale, rows.names, labels)
+
+    def _residual_rows(self, i: int) -> Occurrences:
+        """Return the equations for z at all stages and at the last instant of a phase."""
+        phase, layout, at = self.blocks.problem.phases[i], self.layout, self.layout.phases[i]
+        stages = [np.moveaxis(k, -1, 0).reshape(k.shape[-1], -1) for k in
+                  (at.states, at.smooth, at.algebraic)]  # fmt: skip
+        last = self._last_columns(i)
+        parameters = np.tile(layout.parameters[:, None], stages[0].shape[1])
+        columns = np.concatenate([np.concatenate([parameters, *stages]), last], axis=1)
+        labels = [
+            f"{phase.name} interval {n + 1} stage {k + 1}"
+            for n in at.interval
+            for k in range(CASH_KARP.stages)
+        ]
+        bounds = self._row_bounds(phase.residual, columns.shape[1], phase.name)
+        labels.append(self._label(i, 1.0))
+        block = self.blocks.phases[i].residual
+        return self._occurrences(block, phase.residual, columns, bounds, labels)
+
+    def _last_columns(self, i: int) -> np.ndarray:
+        """Return the unknowns p, x, y, z of the last instant of a phase, shape (n, 1)."""
+        layout, at = self.layout, self.layout.phases[i]
+        end = at.steps[-1]
+        parts = [layout.parameters, layout.states[end], layout.smooth[end], at.last]
+        return np.concatenate(parts)[:, None]
+
+    def _label(self, i: int, fraction: float) -> str:
+        return f"{self.blocks.problem.phases[i].name} at {100 * fraction:.0f} % of the phase"
+
+    def _path_rows(self, i: int) -> Occurrences:
+        """Return the path rows at all nodes but the first, where those of the phase before hold."""
+        phase, layout, at = self.blocks.problem.phases[i], self.layout, self.layout.phases[i]
+        inner = at.starts[1:]
+        parts = [at.states[inner, 0], at.smooth[inner, 0], at.algebraic[inner, 0]]
+        parameters = np.tile(layout.parameters, (len(inner), 1))
+        columns = np.concatenate([np.concatenate([parameters, *parts], axis=1).T,
+                                  self._last_columns(i)], axis=1)  # fmt: skip
+        lower, upper = self._row_bounds(phase.path, columns.shape[1], phase.name)
+        fixed = [k for k, name in enumerate(phase.path.names) if name in phase.fixed_at_end]
+        lower[fixed, -1], upper[fixed, -1] = -INFINITY, INFINITY
+        labels = [self._label(i, fraction) for fraction in self.meshes[i][1:]]
+        block = self.blocks.phases[i].path
+        return self._occurrences(block, phase.path, columns, (lower, upper), labels)
+
+    def _end_rows(self, i: int) -> Occurrences:
+        phase = self.blocks.problem.phases[i]
+        bounds = self._row_bounds(phase.end, 1, phase.name)
+        columns, labels = self._last_columns(i), [self._label(i, 1.0)]
+        return self._occurrences(self.blocks.phases[i].end, phase.end, columns, bounds, labels)
+
+    def _step_rows(self, i: int) -> Occurrences:
+        """Return the formulae of all steps of a phase."""
+        problem, layout, at = self.blocks.problem, self.layout, self.layout.phases[i]
+        mesh, stages = self.meshes[i], CASH_KARP.stages
+        columns, data, labels = [], [], []
+        for m, n in enumerate(at.interval):
+            left, right = at.steps[m : m + 2]
+            parts = [[layout.durations[i]], layout.parameters]
+            for k in range(stages):
+                parts += [at.states[m, k], at.smooth[m, k], at.algebraic[m, k]]
+            parts += [layout.controls[at.nodes[n]], layout.controls[at.nodes[n + 1]]]
+            parts += [layout.integrals[left], layout.states[right], layout.smooth[right]]
+            columns.append(np.concatenate([*parts, layout.integrals[right]]))
+            begin, end = self.edges[i][n][m - at.starts[n] :][:2]
+            length = mesh[n + 1] - mesh[n]
+            points = mesh[n] + length * (begin + (end - begin) * CASH_KARP.times)
+            given = [self.numbers.point_data(i, fraction) for fraction in points]
+            step = [length * (end - begin), begin, end - begin, self.rounding]
+            data.append(np.concatenate([step, *given]))
+            labels.append(f"{problem.phases[i].name} interval {n + 1} step {m - at.starts[n] + 1}")
+        where = [f"stage {k + 2}" for k in range(stages - 1)] + ["end"]
+        groups = (problem.states, problem.smooth)
+        names = [f"{s} at {k}" for k in where for group in groups for s in group.names]
+        scale = np.tile(np.concatenate([group.scale for group in groups]), stages)
+        zeros = np.zeros((len(names) + len(problem.integrals), len(columns)))
+        return Occurrences(
+            self.blocks.phases[i].step,
+            np.array(columns).T,
+            np.array(data).T,
+            zeros,
+            zeros,
+            np.concatenate([scale, problem.integral_scale]),
+            [*names, *(f"integral {s}" for s in problem.integrals)],
+            labels,
+        )
+
+    def _boundary_rows(self) -> Occurrences:
+        rows, layout = self.blocks.problem.boundary.rows, self.layout
+        arrays = (layout.states, layout.smooth, layout.controls)
+        ends = [array[k] for k in (0, -1) for array in arrays]
+        columns = np.concatenate([layout.durations, layout.parameters, *ends, layout.integrals[-1]])
+        bounds, labels = self._row_bounds(rows, 1), ["the whole motion"]
+        return self._occurrences(self.blocks.boundary, rows, columns[:, None], bounds, labels)
+
+    def from_motion(self, motion: PhasedMotion) -> np.ndarray:
+        """Return scaled unknowns whose nodes are those of a motion on any mesh.
+
+        In between they follow from integration, so only the ends of intervals miss their node.
+        """
+        degree = motion.phases[0].degree
+        resampled = motion.resampled(self.meshes, degree)
+        return self.from_nodes(ShootingNodes.of(self.blocks.shooting, resampled))
+
+    def from_nodes(self, nodes: ShootingNodes) -> np.ndarray:
+        """Return scaled unknowns for values at the nodes, integrated in between."""
+        problem, layout = self.blocks.problem, self.layout
+        shooter = Shooter(self.blocks, self.numbers, nodes)
+        values = np.zeros(layout.size)
+        values[layout.durations] = nodes.durations
+        values[layout.parameters] = nodes.parameters
+        splits = np.cumsum([problem.states.size, problem.smooth.size])
+        total = np.zeros(len(problem.integrals))
+        for i, at in enumerate(layout.phases):
+            values[layout.controls[at.nodes]] = nodes.controls[i]
+            for n, first in enumerate(at.starts):
+                steps = shooter.steps(i, n, self.edges[i][n])
+                for m, step in enumerate(steps, start=first):
+                    x, y, _ = np.split(step.stages, splits, axis=1)
+                    times = step.begin + step.width * CASH_KARP.times
+                    values[at.states[m]], values[at.smooth[m]] = x, y
+                    values[at.algebraic[m]] = [
+                        shooter.dynamics(i, n, time, state)[0]
+                        for time, state in zip(times, step.stages, strict=True)
+                    ]
+                    values[layout.integrals[at.steps[m + 1]]] = total + step.end[splits[1] :]
+                total = total + steps[-1].end[splits[1] :]
+            last = np.concatenate([nodes.states[i][-1], nodes.smooth[i][-1], total])
+            values[layout.states[at.steps[-1]]] = nodes.states[i][-1]
+            values[layout.smooth[at.steps[-1]]] = nodes.smooth[i][-1]
+            values[at.last] = shooter.dynamics(i, len(at.starts) - 1, 1.0, last)[0]
+        return values / layout.scale
+
+    def nodes(self, unknowns: np.ndarray) -> ShootingNodes:
+        """Return the values at the nodes."""
+        values, layout = unknowns * self.layout.scale, self.layout
+        ends = [np.append(at.steps[at.starts], at.steps[-1]) for at in layout.phases]
+        return ShootingNodes(
+            self.meshes,
+            values[layout.durations],
+            values[layout.parameters],
+            tuple(values[layout.states[k]] for k in ends),
+            tuple(values[layout.smooth[k]] for k in ends),
+            tuple(values[layout.controls[at.nodes]] for at in layout.phases),
+        )
+
+    def to_motion(self, unknowns: np.ndarray) -> PhasedMotion:
+        """Return the motion, integrated from the nodes, with one interval for every step."""
+        return Shooter(self.blocks, self.numbers, self.nodes(unknowns)).motion(self.edges)
