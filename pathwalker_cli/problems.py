@@ -40,7 +40,7 @@ PROBLEMS: Final = {
     problem.name: problem
     for problem in (
         Problem("ls-barefoot", "barefoot", "fit", _FIT),
-        Problem("mapd-barefoot", "barefoot"),
+        Problem("mapd-barefoot", "barefoot", defaults={"bounds": {"joint_range_margin": 0.0}}),
         Problem("mapd-orthosis", "orthosis"),
         Problem("mapd-ws-orthosis", "orthosis", defaults={"cost": {"walking_speed_weight": 2.0}}),
         Problem("mapd-healthy", "barefoot", defaults={"half_cycle": True}),

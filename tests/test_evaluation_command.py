@@ -98,7 +98,7 @@ def test_two_runs_give_the_change(runs: dict[str, Path], tmp_path: Path) -> None
     assert content["changes"]["walking_speed"]["paper"]["printed"] == "rises"
     speed = content["runs"][0]["quantities"]["walking_speed"]
     assert speed["unit"] == "m/s"
-    assert speed["recorded"]["low"] < speed["recorded"]["mean"] < speed["recorded"]["high"]
+    assert speed["recorded"]["min"] < speed["recorded"]["mean"] < speed["recorded"]["max"]
     assert speed["paper"]["value"] == 0.62
     with (out / "evaluation.csv").open() as file:
         rows = list(csv.DictReader(file))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pathwalker_cli.output.run_metrics import RunInputs
     from pathwalker_cli.patient import Patient
 
-__all__ = ["solve_command"]
+__all__ = ["run_study", "solve_command"]
 
 
 @click.command("solve")
@@ -52,8 +52,38 @@ def solve_command(
     CONFIG is a YAML file or the name of a shipped one. Ctrl-C stops after the current iteration
     and keeps the last iterate. Exit codes: 0 converged, 1 not converged, 2 bad input.
     """
-    from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
+    from pathwalker_cli.output.solve_text import failure_text
+
+    study, patient = _study(problem, config, changes, smoke)
+    folder = out or Path("runs") / f"{problem}-{patient.id}"
+    solution, metrics = run_study(study, patient, folder, warm_start, quiet)
+    if not quiet:
+        _report(solution, metrics, folder)
+    if not solution.converged:
+        raise NotConvergedError(failure_text(solution, str(folder)))
+
+
+def run_study(
+    study: StudyConfig,
+    patient: Patient,
+    folder: Path,
+    warm_start: Path | None = None,
+    quiet: bool = False,
+) -> tuple[GaitSolution, dict[str, Any]]:
+    """Solve a study and write its run folder; return how it ended and the metrics.
+
+    Args:
+        study: The study.
+        patient: Its patient.
+        folder: The run folder; an earlier run in it is replaced.
+        warm_start: Folder of an earlier run to begin with.
+        quiet: Whether no progress shall be shown.
+
+    Raises:
+        DataError: If the folder holds something else, or the earlier run cannot be used.
+    """
+    from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.output.run_folder import (
         check_target,
         config_text,
@@ -61,20 +91,13 @@ def solve_command(
         write_run,
     )
     from pathwalker_cli.output.run_metrics import run_inputs
-    from pathwalker_cli.output.solve_text import failure_text
 
-    study, patient = _study(problem, config, changes, smoke)
-    folder = out or Path("runs") / f"{problem}-{patient.id}"
     check_target(folder)
     earlier = None if warm_start is None else warm_start_run(warm_start, study)
     inputs = run_inputs(config_text(study), patient, warm_start)
     with Progress(quiet) as progress:
         solution = _solve(study, earlier, progress)
-    metrics = write_run(folder, solution, _log(solution, inputs, progress), inputs)
-    if not quiet:
-        _report(solution, metrics, folder)
-    if not solution.converged:
-        raise NotConvergedError(failure_text(solution, str(folder)))
+    return solution, write_run(folder, solution, _log(solution, inputs, progress), inputs)
 
 
 def _study(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, Row
 from pathwalker_cli.evaluation.paper import PaperClaim, PaperNumber
+from pathwalker_cli.evaluation.spread import Spread
 from pathwalker_cli.io.atomic import atomic_open
 
 __all__ = ["evaluation_content", "json_text", "write_csv"]
@@ -78,11 +78,18 @@ def _row(row: Row) -> dict[str, Any]:
     return {
         "value": row.value,
         "unit": row.quantity.unit,
-        "recorded": None if row.recorded is None else asdict(row.recorded),
+        "recorded": _spread(row.recorded),
         "position": row.position,
         "paper": _paper(row.paper),
         "paper_recorded": _paper(row.paper_recorded),
     }
+
+
+def _spread(found: Spread | None) -> dict[str, float] | None:
+    """Return mean and range of recorded values."""
+    if found is None:
+        return None
+    return {"mean": found.mean, "min": found.low, "max": found.high, "count": found.count}
 
 
 def _change(change: Change) -> dict[str, Any]:

@@ -40,9 +40,10 @@ def _of_rows(old: CollocationProgram, values: np.ndarray, new: CollocationProgra
         result = np.zeros((after.block.rows, after.count))
         for series in set(before.series):
             rows = [k for k, name in enumerate(before.series) if name == series]
-            result[rows] = _resample(
+            new_rows = [k for k, name in enumerate(after.series) if name == series]
+            result[new_rows] = _resample(
                 before.times[rows], block[rows], before.weights[rows],
-                after.times[rows], after.weights[rows],
+                after.times[new_rows], after.weights[new_rows],
             )  # fmt: skip
         parts.append(result.ravel(order="F"))
     return np.concatenate(parts)
@@ -69,10 +70,9 @@ def _of_unknowns(
     result = np.zeros(after.size)
     result[after.durations] = values[before.durations]
     result[after.parameters] = values[before.parameters]
-    degree = new.blocks.degree
     for i, (p, q) in enumerate(zip(before.phases, after.phases, strict=True)):
-        old_nodes, old_points = _weights(old.meshes[i], degree)
-        new_nodes, new_points = _weights(new.meshes[i], degree)
+        old_nodes, old_points = _weights(old.meshes[i], old.blocks.degree)
+        new_nodes, new_points = _weights(new.meshes[i], new.blocks.degree)
         for name in ("smooth", "controls"):
             a, b = getattr(before, name)[p.nodes], getattr(after, name)[q.nodes]
             for column in range(a.shape[1]):

@@ -40,6 +40,9 @@ the motion that is handed in, a smaller distance blocks the first steps."""
 _NEXT_PUSH = 1e-8
 """Distance from the bounds in later rounds: they start where the round before ended."""
 
+_BARRIER_SHARE = 1e-2
+"""Barrier at the end of a round, as a share of its tolerance; the next round begins with it."""
+
 Observer = Callable[[str, ProgressReport], None]
 
 
@@ -52,17 +55,15 @@ class ShootingSettings:
             activations, and speeds over 5 m/s or rad/s.
         roundings: Half widths, one per round, to which the kink of equation (2) at e = a is
             rounded off; the last one decides how exactly equation (2) is met.
-        tolerance: Optimality tolerance of the last round.
-        round_tolerance: Optimality tolerance of the rounds before.
+        tolerance: Optimality tolerance of every round.
         constraint_tolerance: Largest scaled violation.
         max_iterations: Iteration limit of a round.
         repeats: How often the last round may be repeated with new steps.
     """
 
     integration_tolerance: float = 1e-5
-    roundings: tuple[float, ...] = (0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4)
+    roundings: tuple[float, ...] = (0.1, 0.01, 1e-3, 1e-4)
     tolerance: float = 1e-6
-    round_tolerance: float = 1e-4
     constraint_tolerance: float = 1e-9
     max_iterations: int = 300
     repeats: int = 3
@@ -268,7 +269,6 @@ class _Search:
     def advance(self) -> None:
         """Choose steps and solve."""
         settings, number = self.settings, len(self.rounds)
-        last = number >= len(settings.roundings) - 1
         rounding = settings.roundings[min(number, len(settings.roundings) - 1)]
         # a third of the tolerance is aimed at: the next solution moves a little
         edges = self.shooter.choose(settings.integration_tolerance / 3)
@@ -281,7 +281,7 @@ class _Search:
         self.result = solve_program(
             cast(Any, self.program),
             self.program.from_nodes(self.nodes),
-            self._ipopt(last),
+            self._ipopt(),
             observer=watch,
         )
         self.nodes = self.program.nodes(self.result.unknowns)
@@ -299,7 +299,7 @@ class _Search:
             )
         )
 
-    def _ipopt(self, last: bool) -> IpoptSettings:
+    def _ipopt(self) -> IpoptSettings:
         """Return settings that start near a motion without multipliers.
 
         Those of the bounds begin at barrier over slack, as at the end of the round before; from
@@ -309,10 +309,10 @@ class _Search:
         push = _FIRST_PUSH if first else _NEXT_PUSH
         pushes = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
         return IpoptSettings(
-            tolerance=settings.tolerance if last else settings.round_tolerance,
+            tolerance=settings.tolerance,
             constraint_tolerance=settings.constraint_tolerance,
             max_iterations=settings.max_iterations,
-            initial_barrier=_FIRST_BARRIER if first else settings.round_tolerance / 10,
+            initial_barrier=_FIRST_BARRIER if first else _BARRIER_SHARE * settings.tolerance,
             extra={
                 "bound_mult_init_method": "mu-based",
                 "constr_mult_init_max": 1e8,

@@ -1,0 +1,67 @@
+"""What is solved to reproduce the article, and the folder that it goes to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from pathwalker_cli.config import StudyConfig, load_config, smoke_version
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.output.run_folder import check_target
+
+__all__ = ["ENTRIES", "ORDER", "SEVERAL", "check_folder", "planned_studies"]
+
+ORDER: Final = (
+    "ls-barefoot",
+    "mapd-barefoot",
+    "mapd-orthosis",
+    "mapd-ws-orthosis",
+    "mapd-healthy",
+)
+"""The problems in the order in which they are solved; each has a shipped config of its name."""
+
+SEVERAL: Final = ("mapd-barefoot", "mapd-orthosis")
+"""Problems whose optimum is sought from several starts: the article's main results."""
+
+ENTRIES: Final = frozenset({"results.md", "figures", "inverse-dynamics", "runs"})
+"""Everything that the folder holds; one with anything else is never written into."""
+
+
+def planned_studies(starts: int, quick: bool) -> dict[str, StudyConfig]:
+    """Return the study of every problem, as shipped.
+
+    Args:
+        starts: Starts of the problems `SEVERAL`.
+        quick: Whether coarse meshes without refinement and one start will do.
+    """
+    studies = {problem: load_config(problem, problem) for problem in ORDER}
+    if quick:
+        return {problem: smoke_version(study) for problem, study in studies.items()}
+    return {
+        problem: study.model_copy(update={"starts": starts}) if problem in SEVERAL else study
+        for problem, study in studies.items()
+    }
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that cannot take the results, before anything is computed.
+
+    Raises:
+        DataError: If it is a file, cannot be written, or holds something else.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise DataError("is a file, not a folder", where=str(folder), mend="choose another --out")
+    found = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    foreign = sorted(name for name in found - ENTRIES if not name.startswith("."))
+    if foreign:
+        raise DataError(
+            f"is not empty and holds {foreign[0]}, which is no result of this command",
+            where=str(folder),
+            allowed="a new folder, or one that an earlier `pathwalker reproduce` began",
+            mend="choose another --out",
+        )
+    for name in ENTRIES - {"results.md"}:
+        if (folder / name).exists() and not (folder / name).is_dir():
+            raise DataError("is a file, not a folder", where=str(folder / name), mend="remove it")
+    for problem in ORDER:
+        check_target(folder / "runs" / problem)

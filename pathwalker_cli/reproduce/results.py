@@ -1,0 +1,128 @@
+"""What the page of results is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.conventions import CONDITIONS, Condition
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
+from pathwalker_cli.evaluation.paper import PATIENT
+from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
+from pathwalker_cli.evaluation.run import gait_of_series
+from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.ocp.series import GaitSeries, gait_series
+from pathwalker_cli.output.run_folder import config_text, load_run
+from pathwalker_cli.output.run_metrics import run_inputs
+from pathwalker_cli.patient import load_patient
+from pathwalker_cli.reproduce.inverse_study import InverseResult
+
+__all__ = ["ProblemResult", "Results", "evaluated", "is_done", "recordings"]
+
+
+@dataclass(frozen=True)
+class ProblemResult:
+    """How a problem ended.
+
+    Args:
+        problem: Its name.
+        metrics: Content of `metrics.json`.
+        config: The config that was solved.
+        kept: Whether it was solved before and not again.
+        series: The stride, None if it did not converge.
+        evaluation: The stride beside the recordings, None if it did not converge.
+    """
+
+    problem: str
+    metrics: Mapping[str, Any]
+    config: StudyConfig
+    kept: bool
+    series: GaitSeries | None = None
+    evaluation: Evaluation | None = None
+
+    @property
+    def converged(self) -> bool:
+        """Whether it is a solution."""
+        return self.evaluation is not None
+
+
+@dataclass(frozen=True)
+class Results:
+    """Everything that was computed.
+
+    Args:
+        problems: The problems by name, in order.
+        inverse: By method of inverse dynamics, its result, or why there is none.
+        recorded: The recordings by condition.
+        quick: Whether the solves were quick checks on coarse meshes.
+    """
+
+    problems: Mapping[str, ProblemResult]
+    inverse: Mapping[str, InverseResult | str]
+    recorded: Mapping[Condition, RecordedGait]
+    quick: bool
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """Changes from mapd-barefoot to mapd-orthosis; none unless both converged."""
+        pair = [self.problems[name].evaluation for name in ("mapd-barefoot", "mapd-orthosis")]
+        if pair[0] is None or pair[1] is None:
+            return ()
+        return gait_changes(pair[0], pair[1])
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Problems that did not converge."""
+        return tuple(name for name, each in self.problems.items() if not each.converged)
+
+
+def recordings() -> dict[Condition, RecordedGait]:
+    """Return the recordings of the article's patient by condition."""
+    patient = load_patient(PATIENT)
+    found = {each: recorded_gait(build_walker(patient, each)) for each in CONDITIONS}
+    return {condition: gait for condition, gait in found.items() if gait is not None}
+
+
+def is_done(folder: Path, study: StudyConfig) -> bool:
+    """Return whether a folder holds a converged run of just this study.
+
+    A run that is damaged, did not converge, or was made from another config or patient file
+    is not done.
+    """
+    try:
+        run = load_run(folder, allow_unconverged=True)
+        same = config_text(run.config) == config_text(study)
+    except DataError:
+        return False
+    now = run_inputs("", load_patient(study.patient)).hashes.get("patient")
+    then = run.metrics.get("input_hashes", {}).get("patient")
+    sealed = (folder / "NOT_CONVERGED.txt").exists()
+    return same and run.metrics["status"] == "converged" and now == then and not sealed
+
+
+def evaluated(
+    folder: Path, kept: bool, recorded: Mapping[Condition, RecordedGait]
+) -> ProblemResult:
+    """Return the result that a run folder holds.
+
+    Args:
+        folder: The run folder, converged or not.
+        kept: Whether it was solved before and not again.
+        recorded: The recordings of the article's patient.
+    """
+    run = load_run(folder, allow_unconverged=True)
+    config, metrics = run.config, run.metrics
+    result = ProblemResult(config.problem, metrics, config, kept)
+    if metrics["status"] != "converged":
+        return result
+    patient = load_patient(config.patient)
+    walker = build_walker(patient, config.condition, config.model.published)
+    series = gait_series(walker, run.motion)
+    gait = gait_of_series(series, config.problem, config.problem, metrics["effort"])
+    theirs = recorded.get(config.condition) if patient.id == PATIENT else None
+    evaluation = evaluate_gait(gait, recorded=theirs)
+    return ProblemResult(config.problem, metrics, config, kept, series, evaluation)
