@@ -1,4 +1,4 @@
-"""How the solution of MAPD-Barefoot converges with the mesh: the table and figure of docs/accuracy.md.
+"""How MAPD-Barefoot converges with the mesh: the table and figure of docs/accuracy.md.
 
 Meshes of 32, 64 and 128 intervals with two collocation degrees, dealt out by phase duration and not
 refined, all at the same local optimum: ``python benchmarks/convergence.py RUN`` with the folder of
@@ -65,7 +65,7 @@ def study(run_folder: Path) -> list[Point]:
         for intervals in reversed(INTERVALS):
             meshes = meshing.by_duration(run.motion.durations, intervals, 2)
             barrier = 1e-4 if before is None else 1e-6
-            settings = solver._settings(TOLERANCE, barrier, warm=before is not None)
+            settings = solver.settings(TOLERANCE, barrier, warm=before is not None)
             name = f"degree {degree}, {intervals} intervals"
             start = motion.resampled(meshes, degree)
             program, result = solver.stage(name, start, numbers, settings, before)
@@ -133,8 +133,8 @@ def draw(points: list[Point]) -> None:
 def page(points: list[Point]) -> str:
     """Return the table of the page."""
     rows = [
-        f"| {p.degree} | {p.intervals} | {p.cost:.5f} | {p.walking_speed:.4f} | {p.median_error:.1e} "
-        f"| {p.worst_error:.1e} | {p.iterations} |"
+        f"| {p.degree} | {p.intervals} | {p.cost:.5f} | {p.walking_speed:.4f} "
+        f"| {p.median_error:.1e} | {p.worst_error:.1e} | {p.iterations} |"
         for p in sorted(points, key=lambda p: (p.degree, p.intervals))
     ]
     found = ", ".join(

@@ -1,20 +1,16 @@
 """Direct collocation: a multi-phase problem on a mesh becomes a nonlinear program.
 
-Every interval carries Radau points; states and algebraic variables are unknown at the points,
-smooth states and controls at the nodes.  Neighbouring intervals and phases share their node, so
-continuity needs no rows.
+Neighbouring intervals and phases share their node, so continuity needs no rows.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
-import casadi as ca
 import numpy as np
 
-from pathwalker_cli.ocp.blocks import Block, BlockProgram, Occurrences
-from pathwalker_cli.ocp.frozen import FrozenTerms
+from pathwalker_cli.ocp.blocks import BlockProgram, Occurrences
+from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.layout import Layout
 from pathwalker_cli.ocp.phased import (
     PhasedMotion,
@@ -23,219 +19,9 @@ from pathwalker_cli.ocp.phased import (
     lagrange_weights,
     quadrature_weights,
 )
-from pathwalker_cli.ocp.problem import (
-    INFINITY,
-    MultiPhaseProblem,
-    Phase,
-    ProblemNumbers,
-    Rows,
-    Variables,
-)
+from pathwalker_cli.ocp.problem import INFINITY, ProblemNumbers, Rows
 
-__all__ = ["CollocationBlocks", "CollocationProgram"]
-
-
-def _differentiation(degree: int) -> np.ndarray:
-    """Return the matrix from start and points of an interval to rates at the points."""
-    times = collocation_times(degree)
-    return lagrange_weights(np.concatenate([[0.0], times]), times, derivative=True)
-
-
-@dataclass(frozen=True)
-class _Unknown:
-    """Solver unknowns and what they mean in physical units."""
-
-    scaled: ca.SX
-    value: ca.SX
-
-    @classmethod
-    def of(cls, variables: Variables, label: str) -> _Unknown:
-        scaled = ca.SX.sym(label, variables.size)
-        return cls(scaled, scaled * variables.scale)
-
-
-@dataclass(frozen=True)
-class _PhaseBlocks:
-    """The blocks of one phase: rows at a point, within an interval, at the last instant."""
-
-    residual: Block
-    path: Block
-    end: Block
-    interval: Block
-
-
-class CollocationBlocks:
-    """The blocks of a problem for one collocation degree; they serve every mesh.
-
-    Args:
-        problem: The structure of the problem.
-        degree: Number of Radau points in an interval.
-    """
-
-    def __init__(self, problem: MultiPhaseProblem, degree: int) -> None:
-        self.problem = problem
-        self.degree = degree
-        self.phases = tuple(
-            _PhaseBlocks(
-                residual=self._point_block(phase, phase.residual, "residual"),
-                path=self._point_block(phase, phase.path, "path"),
-                end=self._point_block(phase, phase.end, "end"),
-                interval=self._interval_block(phase),
-            )
-            for phase in problem.phases
-        )
-        self.node = self._node_block()
-        self.boundary = self._boundary_block()
-        self.sample = self._sample_block()
-
-    def _point_block(self, phase: Phase, rows: Rows, label: str) -> Block:
-        """Return rows at one collocation point; unknowns T, p, x, z, y0, u0, u1."""
-        problem = self.problem
-        duration, fraction, at = ca.SX.sym("T"), ca.SX.sym("fraction"), ca.SX.sym("at")
-        p, x, z = self._unknowns(phase, "")
-        y0, u0, u1 = (
-            _Unknown.of(v, k)
-            for v, k in ((problem.smooth, "y0"), (problem.controls, "u0"), (problem.controls, "u1"))
-        )
-        rise = u1.value - u0.value
-        y = y0.value + duration * fraction * at * (u0.value + at / 2 * rise)
-        u = u0.value + at * rise
-        values = [x.value, z.value, y, u, p.value, problem.shared, problem.point_data]
-        (result,), frozen = self._substituted(phase, [rows.value / rows.scale], values, "")
-        unknowns = [duration, *(k.scaled for k in (p, x, z, y0, u0, u1))]
-        data = ca.vertcat(fraction, at, problem.point_data)
-        name = f"{phase.name}_{label}"
-        return Block(name, ca.vertcat(*unknowns), data, problem.shared, result, frozen=frozen)
-
-    def _unknowns(self, phase: Phase, tag: str) -> tuple[_Unknown, _Unknown, _Unknown]:
-        return (
-            _Unknown.of(self.problem.parameters, f"p{tag}"),
-            _Unknown.of(self.problem.states, f"x{tag}"),
-            _Unknown.of(phase.algebraic, f"z{tag}"),
-        )
-
-    def _substituted(
-        self, phase: Phase, expressions: list[ca.SX], values: list[ca.SX], tag: str
-    ) -> tuple[list[ca.SX], FrozenTerms]:
-        """Return a phase's expressions with its symbols replaced by values."""
-        problem = self.problem
-        symbols = [
-            problem.states.symbol,
-            phase.algebraic.symbol,
-            problem.smooth.symbol,
-            problem.controls.symbol,
-            problem.parameters.symbol,
-            problem.shared,
-            problem.point_data,
-        ]
-        frozen = phase.frozen
-        inputs = [*symbols, frozen.symbol_vector]
-        outer = ca.Function("expressions", inputs, expressions)
-        if not any(ca.depends_on(k, frozen.symbol_vector) for k in expressions if k.numel()):
-            unused = ca.SX.zeros(frozen.symbol_vector.numel())
-            return outer.call([*values, unused], True, False), FrozenTerms()
-        inner = ca.Function("meanings", symbols, [frozen.meaning_vector])
-        renewed = ca.SX.sym(f"frozen{tag}", frozen.symbol_vector.numel())
-        (meanings,) = inner.call(values, True, False)
-        return outer.call([*values, renewed], True, False), FrozenTerms([renewed], [meanings])
-
-    def _interval_block(self, phase: Phase) -> Block:
-        """Return collocation, smooth-state and integral rows of one interval.
-
-        Unknowns T, p, x0, (x_k, z_k) for all points, y0, u0, s0, y1, u1, s1.
-        """
-        problem, d = self.problem, self.degree
-        differentiation = _differentiation(d)
-        times, weights = quadrature_weights(d)
-        duration, fraction = ca.SX.sym("T"), ca.SX.sym("fraction")
-        step = duration * fraction
-        p, x0, _ = self._unknowns(phase, "0")
-        y0, u0, s0 = self._node("0")
-        y1, u1, s1 = self._node("1")
-        points = [self._unknowns(phase, str(k + 1))[1:] for k in range(d)]
-        data = [ca.SX.sym(f"data{k}", problem.point_data.numel()) for k in range(d)]
-        rise = u1.value - u0.value
-        rows, gain, frozen = [], ca.SX.zeros(len(problem.integrals)), FrozenTerms()
-        for k, (x, z) in enumerate(points):
-            y = y0.value + step * times[k] * (u0.value + times[k] / 2 * rise)
-            values = [x.value, z.value, y, u0.value + times[k] * rise, p.value]
-            values += [problem.shared, data[k]]
-            expressions = [phase.derivative, phase.integrands]
-            (derivative, integrands), more = self._substituted(phase, expressions, values, str(k))
-            slope = differentiation[k, 0] * x0.scaled
-            for j, (other, _) in enumerate(points):
-                slope += differentiation[k, j + 1] * other.scaled
-            rows.append(slope - step * derivative / problem.states.scale)
-            gain += weights[k] * integrands
-            frozen = FrozenTerms(frozen.symbols + more.symbols, frozen.meanings + more.meanings)
-        y_gain = step / 2 * (u0.value + u1.value) / problem.smooth.scale
-        rows.append(y1.scaled - y0.scaled - y_gain)
-        rows.append(s1.scaled - s0.scaled - step * gain / problem.integral_scale)
-        unknowns = [duration, p.scaled, x0.scaled]
-        unknowns += [k.scaled for pair in points for k in pair]
-        unknowns += [k.scaled for k in (y0, u0, s0, y1, u1, s1)]
-        return Block(
-            f"{phase.name}_interval",
-            ca.vertcat(*unknowns),
-            ca.vertcat(fraction, *data),
-            problem.shared,
-            ca.vertcat(*rows),
-            frozen=frozen,
-        )
-
-    def _node(self, tag: str) -> tuple[_Unknown, _Unknown, _Unknown]:
-        problem = self.problem
-        symbol = ca.SX.sym(f"s{tag}", len(problem.integrals))
-        return (
-            _Unknown.of(problem.smooth, f"y{tag}"),
-            _Unknown.of(problem.controls, f"u{tag}"),
-            _Unknown(symbol, symbol * problem.integral_scale),
-        )
-
-    def _node_block(self) -> Block:
-        """Return the rows in y and u at a mesh node."""
-        problem, rows = self.problem, self.problem.node_rows
-        y, u, _ = self._node("")
-        symbols = [problem.smooth.symbol, problem.controls.symbol, problem.shared]
-        outer = ca.Function("node", symbols, [rows.value / rows.scale])
-        value = outer(y.value, u.value, problem.shared)
-        unknowns = ca.vertcat(y.scaled, u.scaled)
-        return Block("node", unknowns, ca.SX(0, 1), problem.shared, value)
-
-    def _sample_block(self) -> Block:
-        """Return the objective at an instant inside an interval.
-
-        Unknowns x0 and x at all points; data are their interpolation weights and the point data.
-        """
-        problem, count = self.problem, self.degree + 1
-        states = [_Unknown.of(problem.states, f"x{k}") for k in range(count)]
-        weights = ca.SX.sym("weights", count)
-        value = sum(weights[k] * x.value for k, x in enumerate(states))
-        (cost,) = ca.substitute([problem.sample], [problem.states.symbol], [value])
-        unknowns = ca.vertcat(*(x.scaled for x in states))
-        data = ca.vertcat(weights, problem.point_data)
-        return Block("sample", unknowns, data, problem.shared, ca.SX(0, 1), cost)
-
-    def _boundary_block(self) -> Block:
-        """Return boundary rows and objective.
-
-        Unknowns T of all phases, p, first x, y, u, last x, y, u, integrals.
-        """
-        problem, b = self.problem, self.problem.boundary
-        groups = (problem.states, problem.smooth, problem.controls)
-        p = _Unknown.of(problem.parameters, "p")
-        first = [_Unknown.of(v, f"first{i}") for i, v in enumerate(groups)]
-        last = [_Unknown.of(v, f"last{i}") for i, v in enumerate(groups)]
-        integrals = self._node("")[2]
-        symbols = [b.durations, problem.parameters.symbol, *b.first, *b.last, b.integrals]
-        outer = ca.Function(
-            "boundary", [*symbols, problem.shared], [b.rows.value / b.rows.scale, b.objective]
-        )
-        unknowns = [p, *first, *last, integrals]
-        values = [b.durations, *(k.value for k in unknowns), problem.shared]
-        rows, objective = outer.call(values, True, False)
-        scaled = ca.vertcat(b.durations, *(k.scaled for k in unknowns))
-        return Block("boundary", scaled, ca.SX(0, 1), problem.shared, rows, objective)
+__all__ = ["CollocationProgram"]
 
 
 class CollocationProgram:

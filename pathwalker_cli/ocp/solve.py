@@ -14,7 +14,8 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp import mesh as meshing
-from pathwalker_cli.ocp.collocation import CollocationBlocks, CollocationProgram
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.cost_terms import cost_terms
 from pathwalker_cli.ocp.gait import Form, GaitProblem, GaitWeights
 from pathwalker_cli.ocp.gait_bounds import gait_bounds, recorded_durations, tracking_bounds
@@ -187,7 +188,8 @@ class GaitSolver:
         assert observer is not None
         return lambda report: observer(name, report)
 
-    def _settings(self, tolerance: float, barrier: float, warm: bool = False) -> IpoptSettings:
+    def settings(self, tolerance: float, barrier: float, warm: bool = False) -> IpoptSettings:
+        """Return the settings of a stage: optimality tolerance, first barrier, warm multipliers."""
         solver = self.config.solver
         return IpoptSettings(
             tolerance=tolerance,
@@ -212,12 +214,12 @@ class GaitSolver:
             program, result = self._track()
             motion = program.to_motion(result.unknowns)
             motion = replace(motion, parameters=self.stiffness_guess())
-            settings = self._settings(loose or solver.tolerance, solver.first_barrier)
+            settings = self.settings(loose or solver.tolerance, solver.first_barrier)
         else:
             warm_start = replace(warm_start, phases=warm_start.phases[: len(self.gait.phases)])
             kept = config.mesh.refinements > 0
             motion = warm_start if kept else self._on_first_mesh(warm_start)
-            settings = self._settings(loose or solver.tolerance, solver.warm_barrier)
+            settings = self.settings(loose or solver.tolerance, solver.warm_barrier)
         if not self._interrupted:
             program, result = self.stage("first mesh", motion, numbers, settings)
         program, result, errors = self._refine(program, result, settings.tolerance)
@@ -245,7 +247,7 @@ class GaitSolver:
         meshes = meshing.first(stride.durations[: len(self.gait.phases)], config.mesh)
         costs = len(self.gait.integrals)
         motion = stride.motion(self.walker, stiffness, meshes, config.mesh.degree, costs)
-        settings = self._settings(_TRACKING_TOLERANCE, _TRACKING_BARRIER)
+        settings = self.settings(_TRACKING_TOLERANCE, _TRACKING_BARRIER)
         numbers = self.numbers(_TRACKING, table, _FADED)
         return self.stage("tracking", motion, numbers, settings)
 
@@ -284,11 +286,11 @@ class GaitSolver:
         """Solve on a refined mesh from the last solution; without multipliers if that fails."""
         solver = self.config.solver
         barrier = max(_BARRIER_SHARE * tolerance, solver.refined_barrier)
-        near = self._settings(solver.tolerance, barrier, warm=True)
+        near = self.settings(solver.tolerance, barrier, warm=True)
         program, result = self.stage(name, start, numbers, near, before)
         if result.converged or self._interrupted:
             return program, result
-        far = self._settings(solver.tolerance, solver.warm_barrier)
+        far = self.settings(solver.tolerance, solver.warm_barrier)
         return self.stage(f"{name} again", start, numbers, far)
 
     def _reintegrated(self, motion: PhasedMotion) -> Reintegration:
