@@ -120,7 +120,7 @@ def draw(points: list[Point]) -> None:
                 label = f"{name}, {degree} points"
                 right.loglog(counts, errors, line, marker=marker, color=colour, label=label)
         left.set_xscale("log", base=2)
-        left.set_ylabel("cost, difference from the finest mesh [%]")
+        left.set_ylabel("cost above the finest mesh [%]")
         right.set_ylabel("re-integration error of q [rad, m]")
         for axes in (left, right):
             axes.set_xlabel("mesh intervals")

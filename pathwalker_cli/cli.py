@@ -30,6 +30,11 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "evaluate_command",
         "Compare predicted gait with the recordings of the patient.",
     ),
+    "reproduce": (
+        "pathwalker_cli.commands.reproduce",
+        "reproduce_command",
+        "Reproduce the article from the shipped data, with one page of results.",
+    ),
     "model": (
         "pathwalker_cli.commands.model",
         "model_command",

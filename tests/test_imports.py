@@ -27,6 +27,7 @@ LAYERS = (
     {"ocp", "inverse"},
     {"output"},
     {"evaluation"},
+    {"reproduce"},
     {"commands"},
     {"cli"},
 )
@@ -38,7 +39,13 @@ APART = ({"ocp", "inverse"},)
 CONFINED = {
     "casadi": ("model", "ocp", "commands.doctor"),
     "pinocchio": ("model", "ocp", "inverse", "output.figures.stick_figures"),
-    "matplotlib": ("output.figures", "output.recorded_figures", "evaluation.figures"),
+    "matplotlib": (
+        "output.figures",
+        "output.recorded_figures",
+        "evaluation.figures",
+        "reproduce.figures",
+        "reproduce.muscle_figures",
+    ),
     "click": ("cli", "commands"),
     "rich": ("commands", "output"),
     "ezc3d": ("io",),

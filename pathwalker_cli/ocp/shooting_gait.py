@@ -61,9 +61,9 @@ class ShootingSettings:
         repeats: How often the last round may be repeated with new steps.
     """
 
-    integration_tolerance: float = 1e-5
+    integration_tolerance: float = 1e-4
     roundings: tuple[float, ...] = (0.1, 0.01, 1e-3, 1e-4)
-    tolerance: float = 1e-6
+    tolerance: float = 1e-5
     constraint_tolerance: float = 1e-9
     max_iterations: int = 300
     repeats: int = 3

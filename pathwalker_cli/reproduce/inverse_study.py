@@ -80,7 +80,11 @@ def inverse_result(
     residuals = {}
     for table in residual_tables(trials, patient, config):
         if table.part == "whole cycle" and table.range is not None:
-            spans = {"mean": table.range.mean, "min": table.range.lowest, "max": table.range.highest}
+            spans = {
+                "mean": table.range.mean,
+                "min": table.range.lowest,
+                "max": table.range.highest,
+            }
             for kind, values in spans.items():
                 for part, value in zip(_PARTS, values / table.body_mass, strict=True):
                     residuals[f"{table.condition}_{part}_{kind}"] = float(value)

@@ -83,8 +83,12 @@ class Results:
 def recordings() -> dict[Condition, RecordedGait]:
     """Return the recordings of the article's patient by condition."""
     patient = load_patient(PATIENT)
-    found = {each: recorded_gait(build_walker(patient, each)) for each in CONDITIONS}
-    return {condition: gait for condition, gait in found.items() if gait is not None}
+    found: dict[Condition, RecordedGait] = {}
+    for condition in CONDITIONS:
+        gait = recorded_gait(build_walker(patient, condition))
+        if gait is not None:
+            found[condition] = gait
+    return found
 
 
 def is_done(folder: Path, study: StudyConfig) -> bool:

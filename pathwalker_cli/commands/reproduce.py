@@ -1,0 +1,86 @@
+"""The command `reproduce`: the article's study from the shipped data to one page of results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from pathwalker_cli.config import StudyConfig
+
+__all__ = ["reproduce_command"]
+
+
+@click.command("reproduce")
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path),
+    required=True,
+    metavar="DIR",
+    help="Folder of page, figures and runs; what is done there already is kept.",
+)
+@click.option("--quick", is_flag=True, help="Coarse meshes and single starts, for a quick check.")
+@click.option(
+    "--starts",
+    type=click.IntRange(1, 1000),
+    default=8,
+    show_default=True,
+    metavar="N",
+    help="Starts of mapd-barefoot and mapd-orthosis.",
+)
+@click.option(
+    "--c3d",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="The article's C3D files in DIR/barefoot and DIR/orthosis, for its own inverse dynamics.",
+)
+@click.option("--quiet", is_flag=True, help="Print errors only.")
+def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, quiet: bool) -> None:
+    """Reproduce the article from the shipped data and write DIR/results.md.
+
+    Inverse dynamics, all five problems, figures 1 to 7, and every number of tables 1, 3 and 4 and
+    of the results section: paper, ours, deviation, and why. A run in DIR/runs that converged with
+    the same config is not solved again, so an interrupted call goes on where it was. Exit codes: 0
+    all converged, 1 some problem did not, 2 bad input.
+    """
+    from pathwalker_cli.errors import NotConvergedError
+    from pathwalker_cli.reproduce.pipeline import PAGE, reproduce
+
+    def say(line: str) -> None:
+        if not quiet:
+            click.echo(line)
+
+    def solve(study: StudyConfig, folder: Path) -> None:
+        _solve(study, folder, quiet)
+
+    results = reproduce(out, solve, say, starts, quick, c3d)
+    say(f"\nWritten to {out / PAGE}")
+    if results.failed:
+        raise NotConvergedError(
+            f"{', '.join(results.failed)} did not converge; {out / PAGE} says how it ended, and "
+            "leaves out what depends on it"
+        )
+
+
+def _solve(study: StudyConfig, folder: Path, quiet: bool) -> None:
+    """Solve a study into its run folder.
+
+    Raises:
+        NotConvergedError: If the user stopped it: nothing further is wanted then.
+    """
+    from pathwalker_cli.commands.solve import run_study
+    from pathwalker_cli.errors import NotConvergedError
+    from pathwalker_cli.patient import load_patient
+
+    try:
+        solution, _ = run_study(study, load_patient(study.patient), folder, quiet=quiet)
+        stopped = solution.status == "stopped by the user"
+    except KeyboardInterrupt:
+        stopped = True
+    if stopped:
+        raise NotConvergedError(
+            f"stopped by the user in {study.problem}; the same command goes on from there"
+        )

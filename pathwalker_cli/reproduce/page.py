@@ -1,0 +1,202 @@
+"""The page of results: problems, local optima, every number of the article, figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import Final
+
+from pathwalker_cli.evaluation.evaluate import Change
+from pathwalker_cli.evaluation.paper import NUMBERS, PaperClaim, PaperNumber
+from pathwalker_cli.evaluation.quantities import quantity_of
+from pathwalker_cli.reproduce.comparison import Row, all_rows
+from pathwalker_cli.reproduce.inverse_study import METHODS
+from pathwalker_cli.reproduce.problem_tables import optima_lines, problem_lines
+from pathwalker_cli.reproduce.results import Results
+from pathwalker_cli.reproduce.words import (
+    deviation,
+    label,
+    ours_text,
+    plain,
+    printed,
+    subject,
+    table,
+)
+
+__all__ = ["page_text"]
+
+_HEAD: Final = (
+    "Results of `pathwalker reproduce` beside those of Sreenivasa M, Millard M, Felis M, Mombaur "
+    "K, Wolf SI (2017), Frontiers in Computational Neuroscience 11:23, "
+    "[doi 10.3389/fncom.2017.00023](https://doi.org/10.3389/fncom.2017.00023)."
+)
+_WARNING: Final = (
+    "PathWalker is research software. It is **not a medical device**, and nothing here is a basis "
+    "for the treatment of a patient."
+)
+_READING: Final = (
+    "*As printed*: ours, truncated or rounded, has the digits of the article, which truncates: a "
+    "speed of 0.6098 m/s is printed as 0.60. The article's predictions have bounds that are not "
+    "published, so a deviation of a prediction is no error of either. Every number under *ours* "
+    "was computed from the runs and recordings named here; where none was, the cell says why."
+)
+_INPUTS: Final = (
+    "The healthy child is an input of the model; *ours* is the patient's file that comes with "
+    "PathWalker:"
+)
+_UNCHANGED: Final = 5e-3
+"""Share of its value by which a quantity may move and still count as unchanged."""
+_PLACES: Final = {
+    "table 1": "Table 1: maximum isometric torques",
+    "table 3": "Table 3: residuals of inverse dynamics",
+    "table 4": "Table 4: step lengths and walking speeds",
+    "section 3": "Section 3: all other numbers of the results",
+    "section 4": "Section 4: numbers of the discussion",
+}
+
+
+def page_text(
+    results: Results, versions: Mapping[str, str], date: str, figures: Sequence[tuple[str, str]]
+) -> str:
+    """Return the page as Markdown.
+
+    Args:
+        results: What was computed.
+        versions: Versions of PathWalker and what it stands on.
+        date: When.
+        figures: File below the page's folder and caption of every figure.
+    """
+    lines = ["# The article and PathWalker", "", _HEAD, "", _WARNING, ""]
+    lines += [*_state(results, versions, date), "", "## Problems", ""]
+    lines += [*problem_lines(results), "", "## Local optima", "", *optima_lines(results)]
+    lines += ["", "## The article's numbers", "", _READING]
+    rows = all_rows(results)
+    for place, title in _PLACES.items():
+        own = [row for row in rows if row.number.place.partition(",")[0] == place]
+        lines += ["", f"### {title}", ""]
+        methods = [row for row in own if row.method] if place.startswith("table") else []
+        lines += _by_method(methods) if methods else []
+        plain_rows = [row for row in own if row not in methods]
+        lines += ["", _INPUTS, ""] if methods and plain_rows else []
+        lines += _plainly(plain_rows) if plain_rows else []
+    lines += ["", "### Table 5: springs that are 5 % softer", "", *_table_5()]
+    lines += ["", "### Changes that the article states", "", *_change_lines(results.changes)]
+    lines += ["", "## Figures", "", *_figure_lines(figures)]
+    return "\n".join(lines) + "\n"
+
+
+def _state(results: Results, versions: Mapping[str, str], date: str) -> Iterator[str]:
+    """Yield when and with what this was made, and what is missing."""
+    yield f"Made on {date} with {', '.join(f'{n} {v}' for n, v in versions.items())}."
+    if results.quick:
+        yield ""
+        yield (
+            "**A quick check:** coarse meshes without refinement and one start, to see that "
+            "everything runs. The numbers are for orientation only."
+        )
+    if results.failed:
+        yield ""
+        yield (f"**Did not converge:** {', '.join(results.failed)}. Nothing of them is used below.")
+
+
+def _plainly(rows: Iterable[Row]) -> list[str]:
+    """Return a table with one row per number, or two where two methods give it."""
+    cells = []
+    for row in rows:
+        method = f" ({row.method} method)" if row.method else ""
+        name = f"{subject(row.number)}: {label(row.number)}{method}"
+        cells.append((name, printed(row.number), ours_text(row), deviation(row), _why(row)))
+    return table(("quantity", "paper", "ours", "deviation", "why"), cells)
+
+
+def _by_method(rows: Sequence[Row]) -> list[str]:
+    """Return a table with the methods of inverse dynamics side by side."""
+    found: dict[PaperNumber, dict[str, Row]] = {}
+    for row in rows:
+        found.setdefault(row.number, {})[row.method] = row
+    head = ["quantity", "paper"]
+    for method in METHODS:
+        head += [f"ours, {method} method", "deviation"]
+    cells = []
+    for number, by_method in found.items():
+        line = [f"{subject(number)}: {label(number)}", printed(number)]
+        for method in METHODS:
+            own = by_method.get(method)
+            line += [_brief(own), deviation(own)] if own is not None else ["-", "-"]
+        cells.append((*line, _why(next(iter(by_method.values())))))
+    missing = {row.ours for row in rows if isinstance(row.ours, str)}
+    notes = [f"*n. c.*, {each}.\n" for each in sorted(missing)]
+    return notes + table((*head, "why"), cells)
+
+
+def _brief(row: Row) -> str:
+    """Return our number, or in short that there is none."""
+    return "*n. c.*" if isinstance(row.ours, str) else ours_text(row)
+
+
+def _why(row: Row) -> str:
+    """Return the reason for a difference; none is needed where there is none."""
+    single = isinstance(row.ours, str) or (row.agrees and not row.number.upper)
+    return "" if single and not row.method else row.why
+
+
+def _table_5() -> Iterator[str]:
+    """Yield table 5 as printed: nothing of it is computed here."""
+    yield "Not computed: the perturbation analysis is no part of this command. Printed, in %:"
+    yield ""
+    own = [number for number in NUMBERS if number.place == "table 5"]
+    springs = groupby(own, lambda number: number.quantity.partition("_after_-5%_")[2])
+    by_spring = {spring: list(numbers) for spring, numbers in springs}
+    first = next(iter(by_spring.values()))
+    head = [each.quantity.partition("_after_")[0].replace("_", " ") for each in first]
+    cells = [
+        (spring.replace("_", " "), *(str(number) for number in numbers))
+        for spring, numbers in by_spring.items()
+    ]
+    yield from table(("softer spring", *head), cells)
+
+
+def _change_lines(changes: Sequence[Change]) -> Iterator[str]:
+    """Yield what the article says that the orthosis changes, and what it changes here."""
+    if not changes:
+        yield "Not computed: mapd-barefoot and mapd-orthosis did not both converge."
+        return
+    cells = []
+    for change in changes:
+        if change.paper is None:
+            continue
+        quantity = quantity_of(change.quantity.key)
+        rises = _rises(change.paper)
+        moved = abs(change.value) > _UNCHANGED * abs(change.barefoot)
+        same = ("yes" if (change.value > 0.0) == rises else "no") if moved else "no, unchanged"
+        cells.append(
+            (
+                f"{quantity.section.lower()}: {quantity.label} [{quantity.unit}]",
+                "rises" if rises else "falls",
+                plain(change.barefoot, ".3f"),
+                plain(change.orthosis, ".3f"),
+                plain(change.value, "+.3f"),
+                plain(change.recorded, "+.3f"),
+                same,
+            )
+        )
+    yield "From MAPD-Barefoot to MAPD-Orthosis, SI units and radians; recorded: change of the mean."
+    yield ""
+    head = ("quantity", "paper", "barefoot", "orthosis", "change", "recorded", "same direction")
+    yield from table(head, cells)
+
+
+def _rises(paper: PaperNumber | PaperClaim) -> bool:
+    """Return whether the article says that a quantity rises."""
+    return paper.rises if isinstance(paper, PaperClaim) else paper.value > 0.0
+
+
+def _figure_lines(figures: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Yield the figures with their captions."""
+    if not figures:
+        yield "None: no problem converged."
+    for file, caption in figures:
+        yield f"![{caption}]({file})"
+        yield ""
+        yield f"*{caption}*"
+        yield ""
