@@ -186,6 +186,7 @@ class StudyConfig(YamlModel):
     mesh: MeshConfig = MeshConfig()
     start: StartConfig = StartConfig()
     solver: SolverConfig = SolverConfig()
+    transcription: Literal["collocation", "multiple-shooting"] = "collocation"
     half_cycle: bool = False
     starts: Annotated[int, Field(ge=1, le=1000)] = 1
     smoke: bool = False

@@ -125,12 +125,16 @@ def _study(
 
 def _solve(study: StudyConfig, earlier: Run | None, progress: Progress) -> GaitSolution:
     """Solve a study, from an earlier run if there is one."""
+    from pathwalker_cli.ocp.by_shooting import solve_by_shooting
     from pathwalker_cli.ocp.solve import GaitSolver
     from pathwalker_cli.ocp.starts import solve_from_starts
 
-    if study.starts > 1 and earlier is None:
+    motion = None if earlier is None else earlier.motion
+    if study.transcription == "multiple-shooting":
+        return solve_by_shooting(GaitSolver(study, progress), motion)
+    if study.starts > 1 and motion is None:
         return solve_from_starts(study, progress.optimum)
-    return GaitSolver(study, progress).solve(None if earlier is None else earlier.motion)
+    return GaitSolver(study, progress).solve(motion)
 
 
 def _log(solution: GaitSolution, inputs: RunInputs, progress: Progress) -> list[str]:

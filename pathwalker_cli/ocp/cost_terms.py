@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES
@@ -9,7 +11,7 @@ from pathwalker_cli.ocp.gait import INTEGRALS, GaitWeights
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import Sample
 
-__all__ = ["cost_terms"]
+__all__ = ["cost_terms", "prediction_terms"]
 
 
 def cost_terms(
@@ -23,17 +25,30 @@ def cost_terms(
         samples: Recorded instants of a passage; without them the stride is a prediction.
     """
     totals = motion.phases[-1].integrals[-1]
-    effort, rate, acceleration = totals[:3]
-    distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
-    terms = {
-        "effort_per_distance": weights.effort * effort / distance,
-        "rate_regularisation": weights.rate * rate / distance,
-        "acceleration_regularisation": weights.acceleration * acceleration / distance,
-        "walking_speed": -weights.walking_speed * distance / motion.duration,
-    }
+    terms = prediction_terms(motion, dict(zip(INTEGRALS, totals, strict=False)), weights)
     if samples:
         terms["fit"] = weights.fit * squared_distance(motion, samples)
-        terms["excitation_regularisation"] = weights.excitation * totals[len(INTEGRALS)]
+        terms["excitation_regularisation"] = weights.excitation * float(totals[len(INTEGRALS)])
+    return terms
+
+
+def prediction_terms(
+    motion: PhasedMotion, costs: Mapping[str, float], weights: GaitWeights
+) -> dict[str, float]:
+    """Return the terms of equations (9) and (10) by name.
+
+    Args:
+        motion: A whole stride.
+        costs: Integrals of the running costs over it by name, without weights.
+        weights: Weights of the terms.
+    """
+    distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
+    terms = {
+        "effort_per_distance": weights.effort * costs["effort"] / distance,
+        "rate_regularisation": weights.rate * costs["rate"] / distance,
+        "acceleration_regularisation": weights.acceleration * costs["acceleration"] / distance,
+        "walking_speed": -weights.walking_speed * distance / motion.duration,
+    }
     return {name: float(value) for name, value in terms.items()}
 
 
