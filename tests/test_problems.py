@@ -15,6 +15,7 @@ from pathwalker_cli.errors import ConfigError, DataError
 from pathwalker_cli.io.recordings import read_recording
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.muscle import activation_rate, excitation_from_rate
+from pathwalker_cli.ocp.by_shooting import solve_by_shooting
 from pathwalker_cli.ocp.passage import passage_samples, recorded_passage
 from pathwalker_cli.ocp.solve import GaitSolver, solve_study
 from pathwalker_cli.ocp.starts import solve_from_starts, spread_starts
@@ -132,6 +133,12 @@ def test_starts_are_spread_and_repeatable() -> None:
     assert len({round(study.start.knee_flexion, 6) for study in studies}) == len(studies)
     other = config.model_copy(update={"start": config.start.model_copy(update={"seed": 8})})
     assert spread_starts(other, solver)[1] != studies[1]
+
+
+def test_shooting_solves_predictions_only() -> None:
+    config = load_config("ls-barefoot", changes=("transcription=multiple-shooting",))
+    with pytest.raises(ConfigError, match="fits a recording"):
+        solve_by_shooting(GaitSolver(config))
 
 
 @pytest.mark.slow
