@@ -140,6 +140,16 @@ class MeshConfig(YamlModel):
     velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2
     refinements: Annotated[int, Field(ge=0, le=20)] = 8
 
+    @field_validator("intervals")
+    @classmethod
+    def _one_per_phase(cls, value: int | tuple[int, ...]) -> int | tuple[int, ...]:
+        if isinstance(value, tuple) and len(value) != len(PHASE_NAMES):
+            raise invalid(
+                f"has {len(value)} entries",
+                allowed=f"one number, or one per phase: {len(PHASE_NAMES)}",
+            )
+        return value
+
 
 class StartConfig(YamlModel):
     """Where the search begins."""
@@ -302,9 +312,7 @@ def apply_change(mapping: dict[str, Any], change: str) -> None:
 
 def smoke_version(config: StudyConfig) -> StudyConfig:
     """Return a config with a short horizon for quick checks: coarse mesh, no refinement."""
-    mesh = config.mesh.model_copy(
-        update={"intervals": 16, "least_intervals_per_phase": 2, "refinements": 0}
-    )
+    mesh = config.mesh.model_copy(update={"intervals": (2,) * len(PHASE_NAMES), "refinements": 0})
     loose = {"max_iterations": min(400, config.solver.max_iterations), "tolerance": 1e-3}
     solver = config.solver.model_copy(update=loose)
     return config.model_copy(update={"mesh": mesh, "solver": solver, "smoke": True})

@@ -18,7 +18,7 @@ def uniform(counts: np.ndarray | list[int]) -> tuple[np.ndarray, ...]:
 def first(durations: np.ndarray, config: MeshConfig) -> tuple[np.ndarray, ...]:
     """Return the mesh that a config begins with, for phases of these durations [s]."""
     if isinstance(config.intervals, tuple):
-        return uniform(list(config.intervals))
+        return uniform(list(config.intervals[: len(durations)]))
     return by_duration(durations, config.intervals, config.least_intervals_per_phase)
 
 
