@@ -18,6 +18,7 @@ from matplotlib import rc_context
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.cost_terms import walked_distance
 from pathwalker_cli.ocp.ipopt import NlpResult
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.ocp.verify import reintegrate
@@ -61,25 +62,23 @@ def study(run_folder: Path) -> list[Point]:
     for degree in reversed(DEGREES):
         config = _with_degree(run.config, degree)
         solver = GaitSolver(config)
-        numbers = solver.numbers(solver.weights, solver.bounds.table)
         for intervals in reversed(INTERVALS):
             meshes = meshing.by_duration(run.motion.durations, intervals, 2)
             barrier = 1e-4 if before is None else 1e-6
             settings = solver.settings(TOLERANCE, barrier, warm=before is not None)
             name = f"degree {degree}, {intervals} intervals"
             start = motion.resampled(meshes, degree)
-            program, result = solver.stage(name, start, numbers, settings, before)
+            program, result = solver.stage(name, start, solver.prediction, settings, before)
             if not result.converged:
                 raise SystemExit(f"{name}: {result.status}")
             before, motion = (program, result), program.to_motion(result.unknowns)
             errors = np.concatenate(reintegrate(solver.walker, motion).position)
-            distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
             points.append(
                 Point(
                     degree,
                     motion.intervals,
                     result.objective,
-                    float(distance / motion.duration),
+                    walked_distance(motion) / motion.duration,
                     float(np.median(errors)),
                     float(errors.max()),
                     result.iterations,

@@ -41,11 +41,10 @@ def solve_by_shooting(solver: GaitSolver, warm_start: PhasedMotion | None = None
     collocation = solver.solve(warm_start)
     if not collocation.converged:
         return collocation
-    numbers = solver.numbers(solver.weights, solver.bounds.table)
     first = collocation.last_motion
     first = replace(first, phases=first.phases[: len(solver.gait.phases)])
     settings = ShootingSettings(constraint_tolerance=config.solver.constraint_tolerance)
-    shooting = solve_shooting(solver.gait, numbers, first, settings, solver.observer)
+    shooting = solve_shooting(solver.gait, solver.prediction, first, settings, solver.observer)
     return _solution(collocation, solver, shooting)
 
 
@@ -58,7 +57,7 @@ def _solution(
     seconds = dict(collocation.seconds)
     seconds["verify"] += time.perf_counter() - began
     seconds["build"] += shooting.seconds_build
-    seconds["solve"] += sum(one.seconds for one in shooting.rounds)
+    seconds["solve"] += shooting.seconds
     motion, costs = shooting.motion, shooting.running_costs
     if solver.config.half_cycle:
         motion = full_stride(motion)

@@ -57,17 +57,6 @@ class CollocationProgram:
         """Parameter vector of the nonlinear program."""
         return self.program.parameters(self.numbers.shared)
 
-    def _row_bounds(
-        self, rows: Rows, phase: str = "", at_end: bool = False
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return scaled bounds of rows, from the numbers where they have an entry."""
-        lower, upper = rows.lower.copy(), rows.upper.copy()
-        for i, name in enumerate(rows.names):
-            found = self.numbers.bounds.find(name, phase, at_end)
-            if found is not None:
-                lower[i], upper[i] = found
-        return lower / rows.scale, upper / rows.scale
-
     def _phase_occurrences(self) -> list[Occurrences]:
         return [
             occurrence
@@ -122,7 +111,7 @@ class CollocationProgram:
         rows: Rows = getattr(phase, kind)
         fractions, data = self._points[i]
         count = fractions.size
-        lower, upper = self._row_bounds(rows, phase.name)
+        lower, upper = self.numbers.bounds.of_rows(rows, phase.name)
         lower, upper = (np.tile(k[:, None], count) for k in (lower, upper))
         fixed = [k for k, name in enumerate(rows.names) if name in phase.fixed_at_end]
         lower[fixed, -1], upper[fixed, -1] = -INFINITY, INFINITY
@@ -142,7 +131,7 @@ class CollocationProgram:
     def _end_rows(self, i: int) -> Occurrences:
         phase = self.blocks.problem.phases[i]
         _, data = self._points[i]
-        lower, upper = self._row_bounds(phase.end, phase.name)
+        lower, upper = self.numbers.bounds.of_rows(phase.end, phase.name)
         return Occurrences(
             self.blocks.phases[i].end,
             self._point_columns(i)[:, -1:],
@@ -196,7 +185,7 @@ class CollocationProgram:
 
     def _node_rows(self) -> Occurrences:
         rows, layout = self.blocks.problem.node_rows, self.layout
-        lower, upper = self._row_bounds(rows)
+        lower, upper = self.numbers.bounds.of_rows(rows)
         count = len(layout.smooth)
         labels, times, weights = [""] * count, np.zeros(count), np.zeros(count)
         for i, places in enumerate(layout.phases):
@@ -246,7 +235,7 @@ class CollocationProgram:
 
     def _boundary_rows(self) -> Occurrences:
         rows, layout = self.blocks.problem.boundary.rows, self.layout
-        lower, upper = self._row_bounds(rows)
+        lower, upper = self.numbers.bounds.of_rows(rows)
         ends = [
             array[node]
             for node in (0, -1)

@@ -14,7 +14,8 @@ import numpy as np
 from pathwalker_cli.ocp.blocks import Block
 from pathwalker_cli.ocp.frozen import FrozenTerms
 from pathwalker_cli.ocp.phased import collocation_times, lagrange_weights, quadrature_weights
-from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Rows, Variables
+from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Rows
+from pathwalker_cli.ocp.unknowns import Unknown, boundary_block
 
 __all__ = ["CollocationBlocks"]
 
@@ -23,19 +24,6 @@ def _differentiation(degree: int) -> np.ndarray:
     """Return the matrix from start and points of an interval to rates at the points."""
     times = collocation_times(degree)
     return lagrange_weights(np.concatenate([[0.0], times]), times, derivative=True)
-
-
-@dataclass(frozen=True)
-class _Unknown:
-    """Solver unknowns and what they mean in physical units."""
-
-    scaled: ca.SX
-    value: ca.SX
-
-    @classmethod
-    def of(cls, variables: Variables, label: str) -> _Unknown:
-        scaled = ca.SX.sym(label, variables.size)
-        return cls(scaled, scaled * variables.scale)
 
 
 @dataclass(frozen=True)
@@ -69,7 +57,7 @@ class CollocationBlocks:
             for phase in problem.phases
         )
         self.node = self._node_block()
-        self.boundary = self._boundary_block()
+        self.boundary = boundary_block(problem, problem.controls)
         self.sample = self._sample_block()
 
     def _point_block(self, phase: Phase, rows: Rows, label: str) -> Block:
@@ -78,7 +66,7 @@ class CollocationBlocks:
         duration, fraction, at = ca.SX.sym("T"), ca.SX.sym("fraction"), ca.SX.sym("at")
         p, x, z = self._unknowns(phase, "")
         y0, u0, u1 = (
-            _Unknown.of(v, k)
+            Unknown.of(v, k)
             for v, k in ((problem.smooth, "y0"), (problem.controls, "u0"), (problem.controls, "u1"))
         )
         rise = u1.value - u0.value
@@ -91,11 +79,11 @@ class CollocationBlocks:
         name = f"{phase.name}_{label}"
         return Block(name, ca.vertcat(*unknowns), data, problem.shared, result, frozen=frozen)
 
-    def _unknowns(self, phase: Phase, tag: str) -> tuple[_Unknown, _Unknown, _Unknown]:
+    def _unknowns(self, phase: Phase, tag: str) -> tuple[Unknown, Unknown, Unknown]:
         return (
-            _Unknown.of(self.problem.parameters, f"p{tag}"),
-            _Unknown.of(self.problem.states, f"x{tag}"),
-            _Unknown.of(phase.algebraic, f"z{tag}"),
+            Unknown.of(self.problem.parameters, f"p{tag}"),
+            Unknown.of(self.problem.states, f"x{tag}"),
+            Unknown.of(phase.algebraic, f"z{tag}"),
         )
 
     def _substituted(
@@ -167,13 +155,13 @@ class CollocationBlocks:
             frozen=frozen,
         )
 
-    def _node(self, tag: str) -> tuple[_Unknown, _Unknown, _Unknown]:
+    def _node(self, tag: str) -> tuple[Unknown, Unknown, Unknown]:
         problem = self.problem
         symbol = ca.SX.sym(f"s{tag}", len(problem.integrals))
         return (
-            _Unknown.of(problem.smooth, f"y{tag}"),
-            _Unknown.of(problem.controls, f"u{tag}"),
-            _Unknown(symbol, symbol * problem.integral_scale),
+            Unknown.of(problem.smooth, f"y{tag}"),
+            Unknown.of(problem.controls, f"u{tag}"),
+            Unknown(symbol, symbol * problem.integral_scale),
         )
 
     def _node_block(self) -> Block:
@@ -192,31 +180,10 @@ class CollocationBlocks:
         Unknowns x0 and x at all points; data are their interpolation weights and the point data.
         """
         problem, count = self.problem, self.degree + 1
-        states = [_Unknown.of(problem.states, f"x{k}") for k in range(count)]
+        states = [Unknown.of(problem.states, f"x{k}") for k in range(count)]
         weights = ca.SX.sym("weights", count)
         value = sum(weights[k] * x.value for k, x in enumerate(states))
         (cost,) = ca.substitute([problem.sample], [problem.states.symbol], [value])
         unknowns = ca.vertcat(*(x.scaled for x in states))
         data = ca.vertcat(weights, problem.point_data)
         return Block("sample", unknowns, data, problem.shared, ca.SX(0, 1), cost)
-
-    def _boundary_block(self) -> Block:
-        """Return boundary rows and objective.
-
-        Unknowns T of all phases, p, first x, y, u, last x, y, u, integrals.
-        """
-        problem, b = self.problem, self.problem.boundary
-        groups = (problem.states, problem.smooth, problem.controls)
-        p = _Unknown.of(problem.parameters, "p")
-        first = [_Unknown.of(v, f"first{i}") for i, v in enumerate(groups)]
-        last = [_Unknown.of(v, f"last{i}") for i, v in enumerate(groups)]
-        integrals = self._node("")[2]
-        symbols = [b.durations, problem.parameters.symbol, *b.first, *b.last, b.integrals]
-        outer = ca.Function(
-            "boundary", [*symbols, problem.shared], [b.rows.value / b.rows.scale, b.objective]
-        )
-        unknowns = [p, *first, *last, integrals]
-        values = [b.durations, *(k.value for k in unknowns), problem.shared]
-        rows, objective = outer.call(values, True, False)
-        scaled = ca.vertcat(b.durations, *(k.scaled for k in unknowns))
-        return Block("boundary", scaled, ca.SX(0, 1), problem.shared, rows, objective)

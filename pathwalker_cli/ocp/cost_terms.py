@@ -11,7 +11,7 @@ from pathwalker_cli.ocp.gait import INTEGRALS, GaitWeights
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import Sample
 
-__all__ = ["cost_terms", "prediction_terms"]
+__all__ = ["cost_terms", "prediction_terms", "walked_distance"]
 
 
 def cost_terms(
@@ -42,7 +42,7 @@ def prediction_terms(
         costs: Integrals of the running costs over it by name, without weights.
         weights: Weights of the terms.
     """
-    distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
+    distance = walked_distance(motion)
     terms = {
         "effort_per_distance": weights.effort * costs["effort"] / distance,
         "rate_regularisation": weights.rate * costs["rate"] / distance,
@@ -50,6 +50,11 @@ def prediction_terms(
         "walking_speed": -weights.walking_speed * distance / motion.duration,
     }
     return {name: float(value) for name, value in terms.items()}
+
+
+def walked_distance(motion: PhasedMotion) -> float:
+    """Return how far the pelvis gets in a motion of a gait problem [m]."""
+    return float(motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0])
 
 
 def squared_distance(motion: PhasedMotion, samples: tuple[Sample, ...]) -> float:

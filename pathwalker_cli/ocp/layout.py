@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pathwalker_cli.ocp.problem import BoundTable, MultiPhaseProblem
+from pathwalker_cli.ocp.unknowns import PlaceBook
 
 __all__ = ["Layout", "PhasePlaces"]
 
@@ -87,20 +88,12 @@ class Layout:
         return lower / self.scale, upper / self.scale
 
 
-class _Builder:
+class _Builder(PlaceBook):
     """Hands out places in the order of time."""
 
     def __init__(self, problem: MultiPhaseProblem) -> None:
+        super().__init__()
         self.problem = problem
-        self.scale: list[float] = []
-        self.names: list[str] = []
-
-    def take(self, names: tuple[str, ...], scale: np.ndarray, where: str) -> np.ndarray:
-        """Return places for these unknowns."""
-        start = len(self.scale)
-        self.scale += [float(value) for value in scale]
-        self.names += [f"{name} in {where}" for name in names]
-        return np.arange(start, len(self.scale))
 
     def build(self, meshes: tuple[np.ndarray, ...], degree: int) -> Layout:
         problem = self.problem

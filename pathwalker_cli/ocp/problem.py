@@ -217,6 +217,17 @@ class BoundTable:
         lower, upper = np.array(pairs, float).reshape(-1, 2).T
         return lower, upper
 
+    def of_rows(
+        self, rows: Rows, phase: str = "", at_end: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return scaled bounds of rows: their own, or the entry where there is one."""
+        lower, upper = rows.lower.copy(), rows.upper.copy()
+        for i, name in enumerate(rows.names):
+            found = self.find(name, phase, at_end)
+            if found is not None:
+                lower[i], upper[i] = found
+        return lower / rows.scale, upper / rows.scale
+
     def replace(self, changes: Mapping[tuple[str, ...], tuple[float, float]]) -> BoundTable:
         """Return a table in which these entries are added or replaced."""
         return BoundTable({**self.entries, **changes})

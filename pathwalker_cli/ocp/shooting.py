@@ -67,14 +67,9 @@ class ShootingProgram:
     def _row_bounds(
         self, rows: Rows, count: int, phase: str = "", at_end: bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return scaled bounds of rows, from the numbers where they have an entry, (r, count)."""
-        lower, upper = rows.lower.copy(), rows.upper.copy()
-        for k, name in enumerate(rows.names):
-            found = self.numbers.bounds.find(name, phase, at_end)
-            if found is not None:
-                lower[k], upper[k] = found
-        low, high = (np.tile((k / rows.scale)[:, None], count) for k in (lower, upper))
-        return low, high
+        """Return scaled bounds of rows that hold at several instants, shape (r, count) each."""
+        low, high = self.numbers.bounds.of_rows(rows, phase, at_end)
+        return np.tile(low[:, None], count), np.tile(high[:, None], count)
 
     def _occurrences(
         self,

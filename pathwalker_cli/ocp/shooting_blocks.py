@@ -29,6 +29,7 @@ from pathwalker_cli.ocp.blocks import Block
 from pathwalker_cli.ocp.frozen import FrozenTerms
 from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Rows, Variables
 from pathwalker_cli.ocp.shooting_steps import CASH_KARP
+from pathwalker_cli.ocp.unknowns import Unknown, boundary_block
 
 __all__ = ["PhaseBlocks", "ShootingBlocks", "ShootingProblem"]
 
@@ -60,19 +61,6 @@ class ShootingProblem:
         """
         z, count = phase.algebraic, len(phase.residual.names)
         return Variables(z.symbol[:count], z.names[:count], z.scale[:count])
-
-
-@dataclass(frozen=True)
-class _Unknown:
-    """Solver unknowns and what they mean in physical units."""
-
-    scaled: ca.SX
-    value: ca.SX
-
-    @classmethod
-    def of(cls, variables: Variables, label: str) -> _Unknown:
-        scaled = ca.SX.sym(label, variables.size)
-        return cls(scaled, scaled * variables.scale)
 
 
 @dataclass(frozen=True)
@@ -137,9 +125,9 @@ class ShootingBlocks:
     def _point_block(self, phase: Phase, rows: Rows, label: str) -> Block:
         """Return rows at one instant."""
         problem, frozen = self.problem, phase.frozen
-        p = _Unknown.of(problem.parameters, "p")
-        x, y = _Unknown.of(problem.states, "x"), _Unknown.of(problem.smooth, "y")
-        z = _Unknown.of(self.shooting.algebraic(phase), "z")
+        p = Unknown.of(problem.parameters, "p")
+        x, y = Unknown.of(problem.states, "x"), Unknown.of(problem.smooth, "y")
+        z = Unknown.of(self.shooting.algebraic(phase), "z")
         nothing = [ca.SX.zeros(problem.controls.size), p.value, problem.shared]
         nothing.append(ca.SX.zeros(problem.point_data.numel()))
         values = [x.value, self._padded(phase, z.value), y.value, *nothing]
@@ -171,13 +159,13 @@ class ShootingBlocks:
         duration, share, begin, width, rounding = (
             ca.SX.sym(k) for k in ("T", "share", "begin", "width", "rounding")
         )
-        p = _Unknown.of(problem.parameters, "p")
+        p = Unknown.of(problem.parameters, "p")
         x, y, z = (
-            [_Unknown.of(variables, f"{name}{k}") for k in range(pair.stages)]
+            [Unknown.of(variables, f"{name}{k}") for k in range(pair.stages)]
             for name, variables in (("x", problem.states), ("y", problem.smooth), ("z", algebraic))
         )
-        left, right = (_Unknown.of(self.shooting.controls, f"e{k}") for k in range(2))
-        x_end, y_end = _Unknown.of(problem.states, "x_end"), _Unknown.of(problem.smooth, "y_end")
+        left, right = (Unknown.of(self.shooting.controls, f"e{k}") for k in range(2))
+        x_end, y_end = Unknown.of(problem.states, "x_end"), Unknown.of(problem.smooth, "y_end")
         before, after = (ca.SX.sym(f"s{k}", len(problem.integrals)) for k in range(2))
         data = [ca.SX.sym(f"data{k}", problem.point_data.numel()) for k in range(pair.stages)]
         slope = ca.Function("slope", self._inputs(phase), [phase.derivative, phase.integrands])
@@ -242,20 +230,5 @@ class ShootingBlocks:
 
     @cached_property
     def boundary(self) -> Block:
-        """Boundary rows, objective; unknowns T of all phases, p, first and last x, y, e, costs."""
-        problem, b = self.problem, self.problem.boundary
-        groups = (problem.states, problem.smooth, self.shooting.controls)
-        p = _Unknown.of(problem.parameters, "p")
-        ends = [
-            _Unknown.of(v, f"{end}{i}") for end in ("first", "last") for i, v in enumerate(groups)
-        ]
-        integrals = ca.SX.sym("s", len(problem.integrals))
-        symbols = [b.durations, problem.parameters.symbol, *b.first, *b.last, b.integrals]
-        outer = ca.Function(
-            "boundary", [*symbols, problem.shared], [b.rows.value / b.rows.scale, b.objective]
-        )
-        values = [b.durations, p.value, *(k.value for k in ends)]
-        values += [integrals * problem.integral_scale, problem.shared]
-        rows, objective = outer.call(values, True, False)
-        unknowns = ca.vertcat(b.durations, p.scaled, *(k.scaled for k in ends), integrals)
-        return Block("boundary", unknowns, ca.SX(0, 1), problem.shared, rows, objective)
+        """Boundary rows and objective with e in the place of the controls, see `boundary_block`."""
+        return boundary_block(self.problem, self.shooting.controls)

@@ -9,6 +9,7 @@ import numpy as np
 from pathwalker_cli.ocp.problem import BoundTable, Variables
 from pathwalker_cli.ocp.shooting_blocks import ShootingProblem
 from pathwalker_cli.ocp.shooting_steps import CASH_KARP
+from pathwalker_cli.ocp.unknowns import PlaceBook
 
 __all__ = ["ShootingLayout", "ShootingPlaces"]
 
@@ -103,23 +104,15 @@ class ShootingLayout:
         return lower / self.scale, upper / self.scale
 
 
-class _Builder:
+class _Builder(PlaceBook):
     """Hands out places in the order of time."""
 
     def __init__(self, shooting: ShootingProblem) -> None:
+        super().__init__()
         self.shooting = shooting
         self.problem = shooting.problem
-        self.scale: list[float] = []
-        self.names: list[str] = []
         self.ends: list[tuple[np.ndarray, ...]] = []
         self.controls: list[np.ndarray] = []
-
-    def take(self, names: tuple[str, ...], scale: np.ndarray, where: str) -> np.ndarray:
-        """Return places for these unknowns."""
-        start = len(self.scale)
-        self.scale += [float(value) for value in scale]
-        self.names += [f"{name} in {where}" for name in names]
-        return np.arange(start, len(self.scale))
 
     def _take(self, variables: Variables, where: str) -> np.ndarray:
         return self.take(variables.names, variables.scale, where)

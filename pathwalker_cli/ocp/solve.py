@@ -154,6 +154,11 @@ class GaitSolver:
         reference = self.stride.coordinates
         return ProblemNumbers(shared, table, lambda i, at: reference(i, at), self.samples)
 
+    @cached_property
+    def prediction(self) -> ProblemNumbers:
+        """The numbers of the problem itself."""
+        return self.numbers(self.weights, self.bounds.table)
+
     def stage(
         self,
         name: str,
@@ -208,7 +213,6 @@ class GaitSolver:
                 of the config is tracked first.
         """
         config, solver = self.config, self.config.solver
-        numbers = self.numbers(self.weights, self.bounds.table)
         loose = max(solver.tolerance, solver.first_tolerance) if config.mesh.refinements else 0.0
         if warm_start is None:
             program, result = self._track()
@@ -221,14 +225,13 @@ class GaitSolver:
             motion = warm_start if kept else self._on_first_mesh(warm_start)
             settings = self.settings(loose or solver.tolerance, solver.warm_barrier)
         if not self._interrupted:
-            program, result = self.stage("first mesh", motion, numbers, settings)
+            program, result = self.stage("first mesh", motion, self.prediction, settings)
         program, result, errors = self._refine(program, result, settings.tolerance)
         return self._finish(program, result, errors, warm_start is not None)
 
     def restored(self, result: NlpResult, meshes: tuple[np.ndarray, ...]) -> GaitSolution:
         """Return the solution that another process found on these meshes."""
-        numbers = self.numbers(self.weights, self.bounds.table)
-        program = CollocationProgram(self.blocks, numbers, meshes)
+        program = CollocationProgram(self.blocks, self.prediction, meshes)
         errors = self._reintegrated(program.to_motion(result.unknowns))
         return self._finish(program, result, errors, False)
 
@@ -266,11 +269,10 @@ class GaitSolver:
             done = _within(errors, tolerances) and tolerance <= solver.tolerance
             if not result.converged or done or self._interrupted:
                 break
-            numbers = self.numbers(self.weights, self.bounds.table)
             meshes = meshing.refined(program.meshes, errors, *tolerances, order=mesh.degree)
             start = program.to_motion(result.unknowns).resampled(meshes, mesh.degree)
             name, before = f"refined {attempt}", (program, result)
-            program, result = self._refined(name, start, numbers, before, tolerance)
+            program, result = self._refined(name, start, before, tolerance)
             tolerance = solver.tolerance
             errors = self._reintegrated(program.to_motion(result.unknowns))
         return program, result, errors
@@ -279,7 +281,6 @@ class GaitSolver:
         self,
         name: str,
         start: PhasedMotion,
-        numbers: ProblemNumbers,
         before: tuple[CollocationProgram, NlpResult],
         tolerance: float,
     ) -> tuple[CollocationProgram, NlpResult]:
@@ -287,11 +288,11 @@ class GaitSolver:
         solver = self.config.solver
         barrier = max(_BARRIER_SHARE * tolerance, solver.refined_barrier)
         near = self.settings(solver.tolerance, barrier, warm=True)
-        program, result = self.stage(name, start, numbers, near, before)
+        program, result = self.stage(name, start, self.prediction, near, before)
         if result.converged or self._interrupted:
             return program, result
         far = self.settings(solver.tolerance, solver.warm_barrier)
-        return self.stage(f"{name} again", start, numbers, far)
+        return self.stage(f"{name} again", start, self.prediction, far)
 
     def _reintegrated(self, motion: PhasedMotion) -> Reintegration:
         began = time.perf_counter()

@@ -18,6 +18,7 @@ from scipy.stats import qmc
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.ocp.cost_terms import walked_distance
 from pathwalker_cli.ocp.ipopt import NlpResult
 from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum, StageRecord
 from pathwalker_cli.ocp.solve import GaitSolver
@@ -118,13 +119,12 @@ def _solved(number: int, study: StudyConfig) -> _Outcome:
     solver = GaitSolver(study)
     solution = solver.solve()
     last = solution.last_motion
-    distance = last.phases[-1].states[-1, 0] - last.phases[0].states[0, 0]
     optimum = LocalOptimum(
         start=number,
         description=solver.stride.name,
         status=solution.status,
         cost=solution.cost,
-        walking_speed=float(distance / last.duration),
+        walking_speed=walked_distance(last) / last.duration,
         stiffness=tuple(last.parameters.tolist()),
         iterations=solution.iterations,
         seconds=float(sum(solution.seconds.values())),

@@ -8,6 +8,7 @@ import pinocchio as pin
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, mirror_permutation, mirrored
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
+from pathwalker_cli.ocp.cost_terms import walked_distance
 from pathwalker_cli.ocp.gait import (
     ACCELERATIONS,
     ACTIVATIONS,
@@ -46,7 +47,7 @@ def full_stride(step: PhasedMotion) -> PhasedMotion:
     Args:
         step: Motion in the first four phases; it ends in its own mirrored beginning.
     """
-    length = step.phases[-1].states[-1, 0] - step.phases[0].states[0, 0]
+    length = walked_distance(step)
     costs = step.phases[-1].integrals[-1] - step.phases[0].integrals[0]
     second = tuple(_mirrored(phase, i, length, costs) for i, phase in enumerate(step.phases))
     return PhasedMotion(step.phases + second, step.parameters)
