@@ -14,8 +14,10 @@ from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.io.yaml_file import read_mapping, read_value, validate
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.paths import shipped
+from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient_blocks import Stiffness
 from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.variation import Variation, varied
 
 __all__ = [
     "BoundsConfig",
@@ -30,6 +32,7 @@ __all__ = [
     "load_config",
     "patient_path",
     "smoke_version",
+    "study_patient",
 ]
 
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
@@ -97,6 +100,9 @@ class BoundsConfig(YamlModel):
     joint_speed: Annotated[float, Quantity("rad/s", 1.0, 100.0)] = 30.0
     dorsiflexion_stiffness: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE] | None = None
     plantarflexion_stiffness: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE] | None = None
+    stiffness: dict[str, Annotated[tuple[Stiffness, Stiffness], AS_TUPLE]] = Field(
+        default_factory=dict
+    )
     friction: Annotated[float, Quantity("", 0.05, 2.0)] = 0.8
     least_vertical_force: Annotated[float, Quantity("N", 0.0, 50.0)] = 0.0
     least_height: Annotated[float, Quantity("m", -0.02, 0.0)] = -1e-3
@@ -116,6 +122,15 @@ class BoundsConfig(YamlModel):
         for name, pair in value.items():
             if name not in PHASE_NAMES:
                 raise invalid(f"names '{name}'", allowed=", ".join(PHASE_NAMES))
+            _ordered(pair)
+        return value
+
+    @field_validator("stiffness")
+    @classmethod
+    def _springs(cls, value: dict[str, Any]) -> dict[str, Any]:
+        for name, pair in value.items():
+            if name not in STIFFNESSES:
+                raise invalid(f"names '{name}'", allowed=", ".join(STIFFNESSES))
             _ordered(pair)
         return value
 
@@ -190,6 +205,7 @@ class StudyConfig(YamlModel):
 
     problem: str
     patient: str
+    variation: Variation = Variation()
     model: ModelConfig = ModelConfig()
     cost: CostConfig = CostConfig()
     bounds: BoundsConfig = BoundsConfig()
@@ -294,6 +310,16 @@ def patient_path(patient: str, config_file: Path) -> str:
     """Return a patient path relative to the config's folder as a full path; ids stay."""
     candidate = config_file.parent / patient
     return str(candidate.resolve()) if "/" in patient or candidate.is_file() else patient
+
+
+def study_patient(config: StudyConfig) -> Patient:
+    """Return the patient of a study, with its variation.
+
+    Raises:
+        PatientError: If there is no such patient or its file is refused.
+        ConfigError: If the variation does not fit the patient.
+    """
+    return varied(load_patient(config.patient), config.variation)
 
 
 def apply_change(mapping: dict[str, Any], change: str) -> None:

@@ -71,6 +71,7 @@ class Patient(YamlModel):
     orthosis: OrthosisData | None = None
     recorded: dict[Condition, Recorded] = Field(default_factory=dict)
     _source: Path | None = PrivateAttr(default=None)
+    _changes: tuple[str, ...] = PrivateAttr(default=())
 
     @field_validator("id")
     @classmethod
@@ -191,7 +192,7 @@ class Patient(YamlModel):
                 f"age for Jensen's regressions: {self.age_for_regressions:g} years instead of "
                 f"{self.age:g} ({self.age_for_regressions_reason.strip()})"
             )
-        return tuple(notes)
+        return (*notes, *self._changes)
 
     def _lacks(self, key: str, mend: str) -> PatientError:
         where = str(self._source) if self._source else f"patient {self.id}"

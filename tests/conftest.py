@@ -16,6 +16,7 @@ import pytest
 from helpers import stylised_series, walker_of
 from pathwalker_cli.config import load_config
 from pathwalker_cli.ocp.gait_bounds import gait_bounds
+from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult
 from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
 from pathwalker_cli.ocp.verify import ActiveBound, Reintegration, Violation
 from pathwalker_cli.problems import PROBLEMS
@@ -38,6 +39,12 @@ def _no_network() -> Iterator[None]:
         yield
 
 
+def made_result() -> NlpResult:
+    """Return the end of a nonlinear program of two unknowns and one row."""
+    two, one = np.array([0.1, -0.2]), np.array([0.5])
+    return NlpResult("converged", two, one, 0.4, Multipliers(two, one), 42, 1.5, 0.5)
+
+
 @pytest.fixture(scope="session")
 def made_solution() -> MadeSolution:
     """Return a function that makes the end of a solve out of the stylised gait."""
@@ -51,7 +58,7 @@ def made_solution() -> MadeSolution:
             walker=walker,
             status="converged",
             last_motion=(stylised_series(PROBLEMS[problem].condition).motion),
-            nlp=None,  # type: ignore[arg-type]
+            nlp=made_result(),
             bounds=gait_bounds(walker, config.bounds),
             cost=0.4,
             cost_terms={"effort_per_distance": 0.4},

@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from pathwalker_cli.studies.run import RunLog
+
 if TYPE_CHECKING:
     from pathwalker_cli.ocp.ipopt import ProgressReport
     from pathwalker_cli.ocp.solution import LocalOptimum
@@ -22,8 +24,8 @@ PAUSE: Final = 0.1
 """Least time between two redraws of the live line [s]."""
 
 
-class Progress:
-    """Shows every iteration and keeps all of them as `lines`.
+class Progress(RunLog):
+    """Shows every iteration and every start, and keeps them.
 
     Args:
         quiet: Whether nothing shall be shown.
@@ -31,11 +33,10 @@ class Progress:
     """
 
     def __init__(self, quiet: bool = False, console: Console | None = None) -> None:
-        self.lines: list[str] = []
+        super().__init__()
         self._console = console or Console(stderr=True)
         self._quiet = quiet
         self._live: Live | None = None
-        self._began = time.perf_counter()
         self._drawn = 0.0
         self._stage = ""
         self._last = ""
@@ -69,28 +70,22 @@ class Progress:
         if stage != self._stage:
             self._end_stage()
             self._stage = stage
-        now = time.perf_counter() - self._began
-        self._last = (
-            f"{stage:<10} iteration {report.iteration:4d}   cost {report.objective:<11.5g} "
-            f"infeasibility {report.infeasibility:.1e}   {now:6.1f} s"
-        )
-        self.lines.append(self._last)
+        super().__call__(stage, report)
+        self._last = self.lines[-1]
         if self._live is not None:
-            self._redraw(now)
+            self._redraw()
         elif report.iteration % EVERY == 0:
             self._print()
 
     def optimum(self, found: LocalOptimum) -> None:
         """Take note of where one of several starts ended."""
         self._end_stage()
-        self._last = (
-            f"start {found.start:<3d} {found.status}, cost {found.cost:.5g}, "
-            f"{found.walking_speed:.3f} m/s, {found.iterations} iterations, {found.description}"
-        )
-        self.lines.append(self._last)
+        super().optimum(found)
+        self._last = self.lines[-1]
         self._print()
 
-    def _redraw(self, now: float) -> None:
+    def _redraw(self) -> None:
+        now = time.perf_counter()
         if self._live is not None and now - self._drawn >= PAUSE:
             self._drawn = now
             self._live.update(Text(self._last, no_wrap=True, overflow="crop"), refresh=True)

@@ -71,12 +71,13 @@ def _solve(study: StudyConfig, folder: Path, quiet: bool) -> None:
     Raises:
         NotConvergedError: If the user stopped it: nothing further is wanted then.
     """
-    from pathwalker_cli.commands.solve import run_study
+    from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.patient import load_patient
+    from pathwalker_cli.studies.run import run_study
 
     try:
-        solution, _ = run_study(study, load_patient(study.patient), folder, quiet=quiet)
+        with Progress(quiet) as progress:
+            solution, _ = run_study(study, folder, log=progress)
         stopped = solution.status == "stopped by the user"
     except KeyboardInterrupt:
         stopped = True

@@ -8,14 +8,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.config import StudyConfig
     from pathwalker_cli.ocp.solution import GaitSolution
-    from pathwalker_cli.output.run_folder import Run
-    from pathwalker_cli.output.run_metrics import RunInputs
     from pathwalker_cli.patient import Patient
 
-__all__ = ["run_study", "solve_command"]
+__all__ = ["solve_command"]
 
 
 @click.command("solve")
@@ -52,67 +49,33 @@ def solve_command(
     CONFIG is a YAML file or the name of a shipped one. Ctrl-C stops after the current iteration
     and keeps the last iterate. Exit codes: 0 converged, 1 not converged, 2 bad input.
     """
+    from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.output.solve_text import failure_text
+    from pathwalker_cli.studies.run import run_study
 
     study, patient = _study(problem, config, changes, smoke)
     folder = out or Path("runs") / f"{problem}-{patient.id}"
-    solution, metrics = run_study(study, patient, folder, warm_start, quiet)
+    with Progress(quiet) as progress:
+        solution, metrics = run_study(study, folder, warm_start, progress)
     if not quiet:
         _report(solution, metrics, folder)
     if not solution.converged:
         raise NotConvergedError(failure_text(solution, str(folder)))
 
 
-def run_study(
-    study: StudyConfig,
-    patient: Patient,
-    folder: Path,
-    warm_start: Path | None = None,
-    quiet: bool = False,
-) -> tuple[GaitSolution, dict[str, Any]]:
-    """Solve a study and write its run folder; return how it ended and the metrics.
-
-    Args:
-        study: The study.
-        patient: Its patient.
-        folder: The run folder; an earlier run in it is replaced.
-        warm_start: Folder of an earlier run to begin with.
-        quiet: Whether no progress shall be shown.
-
-    Raises:
-        DataError: If the folder holds something else, or the earlier run cannot be used.
-    """
-    from pathwalker_cli.commands.progress import Progress
-    from pathwalker_cli.output.run_folder import (
-        check_target,
-        config_text,
-        warm_start_run,
-        write_run,
-    )
-    from pathwalker_cli.output.run_metrics import run_inputs
-
-    check_target(folder)
-    earlier = None if warm_start is None else warm_start_run(warm_start, study)
-    inputs = run_inputs(config_text(study), patient, warm_start)
-    with Progress(quiet) as progress:
-        solution = _solve(study, earlier, progress)
-    return solution, write_run(folder, solution, _log(solution, inputs, progress), inputs)
-
-
 def _study(
     problem: str, path: str, changes: tuple[str, ...], smoke: bool
 ) -> tuple[StudyConfig, Patient]:
     """Return the config with all overrides, and its patient."""
-    from pathwalker_cli.config import load_config, smoke_version
+    from pathwalker_cli.config import load_config, smoke_version, study_patient
     from pathwalker_cli.errors import PatientError
-    from pathwalker_cli.patient import load_patient
     from pathwalker_cli.problems import problem_named
 
     problem_named(problem)
     study = load_config(path, problem, changes)
     try:
-        patient = load_patient(study.patient)
+        patient = study_patient(study)
     except PatientError as error:
         if error.where:
             raise
@@ -121,34 +84,6 @@ def _study(
             error.what, where=where, allowed=error.allowed, mend=error.mend
         ) from None
     return smoke_version(study) if smoke else study, patient
-
-
-def _solve(study: StudyConfig, earlier: Run | None, progress: Progress) -> GaitSolution:
-    """Solve a study, from an earlier run if there is one."""
-    from pathwalker_cli.ocp.by_shooting import solve_by_shooting
-    from pathwalker_cli.ocp.solve import GaitSolver
-    from pathwalker_cli.ocp.starts import solve_from_starts
-
-    motion = None if earlier is None else earlier.motion
-    if study.transcription == "multiple-shooting":
-        return solve_by_shooting(GaitSolver(study, progress), motion)
-    if study.starts > 1 and motion is None:
-        return solve_from_starts(study, progress.optimum)
-    return GaitSolver(study, progress).solve(motion)
-
-
-def _log(solution: GaitSolution, inputs: RunInputs, progress: Progress) -> list[str]:
-    """Return the lines of `log.txt`: every iteration, then every stage."""
-    lines = [f"{solution.config.problem}, patient {solution.walker.patient.id}"]
-    lines += [f"{name} sha256 {value}" for name, value in inputs.hashes.items()]
-    lines += progress.lines
-    for stage in solution.stages:
-        lines.append(
-            f"stage {stage.name}: {stage.status}; {stage.intervals} intervals, "
-            f"{stage.unknowns} unknowns, {stage.iterations} iterations, {stage.seconds:.2f} s, "
-            f"of which {stage.seconds_functions:.2f} s in functions"
-        )
-    return [*lines, f"status: {solution.status}"]
 
 
 def _report(solution: GaitSolution, metrics: dict[str, Any], folder: Path) -> None:

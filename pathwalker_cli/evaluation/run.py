@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pathwalker_cli.config import study_patient
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.model.contact import PHASE_NAMES
@@ -13,7 +14,6 @@ from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.series import GaitSeries, gait_series
 from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.output.run_folder import load_run
-from pathwalker_cli.patient import load_patient
 
 __all__ = ["gait_of_run", "gait_of_series"]
 
@@ -42,7 +42,7 @@ def gait_of_run(folder: str | Path) -> Gait:
             allowed="a stride of both legs in eight phases",
         )
     config = run.config
-    patient = load_patient(config.patient)
+    patient = study_patient(config)
     walker = build_walker(patient, config.condition, config.model.published)
     notes = ("a quick check on a coarse mesh: for orientation only",) if config.smoke else ()
     series = gait_series(walker, run.motion)

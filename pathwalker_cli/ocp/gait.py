@@ -8,7 +8,7 @@ controls their rates.  For fixed a, equation (2) increases strictly in the excit
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Final, Literal
@@ -190,6 +190,13 @@ class GaitProblem:
         names = STIFFNESSES if walker.orthosis else ()
         self.stiffness = Variables.make("stiffness", names, _STIFFNESS)
         self.reference = ca.SX.sym("q_ref", len(COORDINATES))
+
+    @property
+    def structure(self) -> Hashable:
+        """What the expressions depend on; problems of equal structure differ in numbers only."""
+        body = self.walker.rigid_body
+        names = tuple(body.parameter_names)
+        return self.form, body.backend, body.topology, names, self.walker.orthosis is not None
 
     @property
     def q(self) -> ca.SX:

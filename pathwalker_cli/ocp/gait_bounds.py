@@ -167,7 +167,7 @@ def _stiffness(
     entries: dict[tuple[str, ...], Range] = {}
     for name in STIFFNESSES:
         kind = name.split("_")[0]
-        given = getattr(config, f"{kind}_stiffness")
+        given = config.stiffness.get(name) or getattr(config, f"{kind}_stiffness")
         pair = given or getattr(real, kind)
         entries[(name,)] = pair
         reason = "from the config" if given else f"real springs: {real.source}"

@@ -16,7 +16,14 @@ import numpy as np
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.machine import keep_freed_memory, use_one_blas_thread
 
-__all__ = ["IpoptSettings", "Multipliers", "NlpResult", "ProgressReport", "solve_program"]
+__all__ = [
+    "IpoptSettings",
+    "Multipliers",
+    "NlpResult",
+    "NlpSolver",
+    "ProgressReport",
+    "solve_program",
+]
 
 
 @dataclass(frozen=True)
@@ -153,12 +160,16 @@ class _Watcher(ca.Callback):
         ca.Callback.__init__(self)
         nlp = program.program
         self._sizes = (nlp.size, nlp.rows, program.parameters.size)
-        self._lower, self._upper = nlp.lower, nlp.upper
         self._observer = observer
+        self.begin(program)
+        self.construct("watcher", {})
+
+    def begin(self, program: CollocationProgram) -> None:
+        """Get ready for a solve with the bounds of this program."""
+        self._lower, self._upper = program.program.lower, program.program.upper
         self._start = time.perf_counter()
         self.iteration = -1
         self.stop = False
-        self.construct("watcher", {})
 
     def get_n_in(self) -> int:
         return int(ca.nlpsol_n_out())
@@ -207,6 +218,85 @@ def _interruptible(watcher: _Watcher) -> Iterator[None]:
         signal.signal(signal.SIGINT, previous)
 
 
+class NlpSolver:
+    """IPOPT for programs of one structure: built once, called with many numbers and starts.
+
+    Args:
+        program: A program of the structure.
+        settings: Settings of all solves.
+        observer: Called after every iteration.
+    """
+
+    def __init__(
+        self,
+        program: CollocationProgram,
+        settings: IpoptSettings,
+        observer: Observer | None = None,
+    ) -> None:
+        use_one_blas_thread()
+        keep_freed_memory()
+        functions = program.program.functions()
+        self._watcher = _Watcher(program, observer)
+        options: dict[str, Any] = {
+            "ipopt": settings.as_options(),
+            "print_time": False,
+            "error_on_fail": False,
+            "iteration_callback": self._watcher,
+            "calc_lam_p": False,
+            **{key: functions[key] for key in ("grad_f", "jac_g", "hess_lag")},
+        }
+        self._solver = ca.nlpsol("solver", "ipopt", functions["nlp"], options)
+
+    def solve(
+        self,
+        program: CollocationProgram,
+        start: np.ndarray,
+        multipliers: Multipliers | None = None,
+    ) -> NlpResult:
+        """Minimise a program of the structure.
+
+        Args:
+            program: The program.
+            start: Scaled unknowns to start from.
+            multipliers: Multipliers to start from, for a warm start.
+
+        Returns:
+            The last iterate, converged or not.
+        """
+        lower, upper = program.bounds
+        arguments: dict[str, Any] = {
+            "x0": start,
+            "p": program.parameters,
+            "lbx": lower,
+            "ubx": upper,
+            "lbg": program.program.lower,
+            "ubg": program.program.upper,
+        }
+        if multipliers is not None:
+            arguments |= {"lam_x0": multipliers.unknowns, "lam_g0": multipliers.rows}
+        self._watcher.begin(program)
+        began = time.perf_counter()
+        with _interruptible(self._watcher):
+            solution = self._solver(**arguments)
+        seconds = time.perf_counter() - began
+        stats = self._solver.stats()
+        status = stats["return_status"]
+        return NlpResult(
+            status=_REASONS.get(status, status.replace("_", " ").lower()),
+            unknowns=np.asarray(solution["x"]).ravel(),
+            rows=np.asarray(solution["g"]).ravel(),
+            objective=float(solution["f"]),
+            multipliers=Multipliers(
+                np.asarray(solution["lam_x"]).ravel(), np.asarray(solution["lam_g"]).ravel()
+            ),
+            iterations=int(stats["iter_count"]),
+            seconds=seconds,
+            seconds_functions=sum(
+                value for key, value in stats.items() if key.startswith("t_wall_nlp_")
+            ),
+        )
+
+
 def solve_program(
     program: CollocationProgram,
     start: np.ndarray,
@@ -214,59 +304,5 @@ def solve_program(
     multipliers: Multipliers | None = None,
     observer: Observer | None = None,
 ) -> NlpResult:
-    """Minimise a program with IPOPT.
-
-    Args:
-        program: The program.
-        start: Scaled unknowns to start from.
-        settings: Settings.
-        multipliers: Multipliers to start from, for a warm start.
-        observer: Called after every iteration.
-
-    Returns:
-        The last iterate, converged or not.
-    """
-    use_one_blas_thread()
-    keep_freed_memory()
-    functions = program.program.functions()
-    watcher = _Watcher(program, observer)
-    options: dict[str, Any] = {
-        "ipopt": settings.as_options(),
-        "print_time": False,
-        "error_on_fail": False,
-        "iteration_callback": watcher,
-        "calc_lam_p": False,
-        **{key: functions[key] for key in ("grad_f", "jac_g", "hess_lag")},
-    }
-    solver = ca.nlpsol("solver", "ipopt", functions["nlp"], options)
-    lower, upper = program.bounds
-    arguments: dict[str, Any] = {
-        "x0": start,
-        "p": program.parameters,
-        "lbx": lower,
-        "ubx": upper,
-        "lbg": program.program.lower,
-        "ubg": program.program.upper,
-    }
-    if multipliers is not None:
-        arguments |= {"lam_x0": multipliers.unknowns, "lam_g0": multipliers.rows}
-    began = time.perf_counter()
-    with _interruptible(watcher):
-        solution = solver(**arguments)
-    seconds = time.perf_counter() - began
-    stats = solver.stats()
-    status = stats["return_status"]
-    return NlpResult(
-        status=_REASONS.get(status, status.replace("_", " ").lower()),
-        unknowns=np.asarray(solution["x"]).ravel(),
-        rows=np.asarray(solution["g"]).ravel(),
-        objective=float(solution["f"]),
-        multipliers=Multipliers(
-            np.asarray(solution["lam_x"]).ravel(), np.asarray(solution["lam_g"]).ravel()
-        ),
-        iterations=int(stats["iter_count"]),
-        seconds=seconds,
-        seconds_functions=sum(
-            value for key, value in stats.items() if key.startswith("t_wall_nlp_")
-        ),
-    )
+    """Minimise a program once; see `NlpSolver`."""
+    return NlpSolver(program, settings, observer).solve(program, start, multipliers)

@@ -9,13 +9,12 @@ from functools import cached_property
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.conventions import COORDINATES, STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.cost_terms import cost_terms
 from pathwalker_cli.ocp.gait import Form, GaitProblem, GaitWeights
 from pathwalker_cli.ocp.gait_bounds import gait_bounds, recorded_durations, tracking_bounds
@@ -26,6 +25,7 @@ from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers, Sample
 from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
 from pathwalker_cli.ocp.start import ReferenceStride, reference_stride, start_recording
+from pathwalker_cli.ocp.structures import gait_blocks
 from pathwalker_cli.ocp.symmetry import asymmetries, full_stride
 from pathwalker_cli.ocp.verify import (
     Reintegration,
@@ -33,7 +33,6 @@ from pathwalker_cli.ocp.verify import (
     largest_violations,
     reintegrate,
 )
-from pathwalker_cli.patient import load_patient
 
 __all__ = ["GaitSolver", "solve_study"]
 
@@ -71,7 +70,7 @@ class GaitSolver:
     def __post_init__(self) -> None:
         """Build walker, bounds and the blocks of the problem."""
         began = time.perf_counter()
-        patient = load_patient(self.config.patient)
+        patient = study_patient(self.config)
         model = self.config.model
         self.walker = build_walker(patient, self.config.condition, model.published, model.backend)
         self.bounds = gait_bounds(self.walker, self.config.bounds)
@@ -80,7 +79,7 @@ class GaitSolver:
             _ = self.stride  # a missing recording is refused before anything is built
         if self.config.fits:
             self.bounds = recorded_durations(self.bounds, self.stride.durations)
-        self.blocks = CollocationBlocks(self.gait.build(), self.config.mesh.degree)
+        self.blocks = gait_blocks(self.gait, self.config.mesh.degree)
         self.seconds["build"] += time.perf_counter() - began
 
     def _form(self) -> Form:
@@ -151,7 +150,8 @@ class GaitSolver:
         """Return the numbers of a stage."""
         friction = self.config.bounds.friction
         shared = self.gait.shared_values(weights, friction, orthosis_share)
-        reference = self.stride.coordinates
+        follows = weights.tracking or self.config.fits
+        reference = self.stride.coordinates if follows else _no_reference
         return ProblemNumbers(shared, table, lambda i, at: reference(i, at), self.samples)
 
     @cached_property
@@ -330,6 +330,11 @@ class GaitSolver:
             stages=tuple(self.stages),
             seconds=dict(self.seconds),
         )
+
+
+def _no_reference(phase: int, fraction: float) -> np.ndarray:
+    """Return what stands in for a stride to follow where none is followed."""
+    return np.zeros(len(COORDINATES))
 
 
 def _within(errors: Reintegration, tolerances: tuple[float, float]) -> bool:

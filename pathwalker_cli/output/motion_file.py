@@ -16,7 +16,7 @@ from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.ocp.gait import INTEGRALS, PASSAGE_INTEGRALS
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
-__all__ = ["read_motion", "write_motion"]
+__all__ = ["read_arrays", "read_motion", "write_motion"]
 
 _ARRAYS: Final = (
     "mesh", "states", "smooth", "controls", "integrals", "inner_states", "algebraic"
@@ -47,7 +47,7 @@ def read_motion(path: str | Path) -> PhasedMotion:
     Raises:
         DataError: If the file is missing, damaged or no motion of a gait problem.
     """
-    arrays = _arrays(Path(path))
+    arrays = read_arrays(Path(path))
     try:
         names = tuple(str(name) for name in arrays["phases"])
         if names != PHASE_NAMES:
@@ -66,8 +66,12 @@ def read_motion(path: str | Path) -> PhasedMotion:
     return motion
 
 
-def _arrays(path: Path) -> Mapping[str, np.ndarray]:
-    """Return all arrays of a file."""
+def read_arrays(path: Path) -> Mapping[str, np.ndarray]:
+    """Return all arrays of an `.npz` file of a run.
+
+    Raises:
+        DataError: If the file is missing or damaged.
+    """
     try:
         with np.load(path, allow_pickle=False) as file:
             if not isinstance(file, np.lib.npyio.NpzFile):
@@ -76,7 +80,7 @@ def _arrays(path: Path) -> Mapping[str, np.ndarray]:
     except FileNotFoundError:
         raise DataError("no such file", where=str(path), mend=_AGAIN) from None
     except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error):
-        raise DataError("is damaged or no motion of a run", where=str(path), mend=_AGAIN) from None
+        raise DataError("is damaged or no file of a run", where=str(path), mend=_AGAIN) from None
 
 
 def _check(motion: PhasedMotion, path: str | Path) -> None:

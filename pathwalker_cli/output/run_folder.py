@@ -18,11 +18,13 @@ import yaml
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.ocp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output.figures import save_figures
 from pathwalker_cli.output.motion_file import read_motion, write_motion
+from pathwalker_cli.output.multipliers_file import read_multipliers, write_multipliers
 from pathwalker_cli.output.recorded_reference import recorded_reference
 from pathwalker_cli.output.run_metrics import (
     RUN_FORMAT,
@@ -44,9 +46,12 @@ __all__ = [
 ]
 
 _CONFIG, _METRICS, _MOTION = "config.resolved.yaml", "metrics.json", "motion.npz"
+_MULTIPLIERS: Final = "multipliers.npz"
 _SEAL: Final = "NOT_CONVERGED.txt"
 
-ENTRIES: Final = frozenset({_CONFIG, _METRICS, _MOTION, _SEAL, "log.txt", "figures", *TABLES})
+ENTRIES: Final = frozenset(
+    {_CONFIG, _METRICS, _MOTION, _MULTIPLIERS, _SEAL, "log.txt", "figures", *TABLES}
+)
 """Everything that a run folder holds; a folder with anything else is never replaced."""
 
 
@@ -59,12 +64,14 @@ class Run:
         metrics: Content of `metrics.json`.
         motion: The exact motion.
         config: The config with all defaults filled in.
+        multipliers: Multipliers of the solution by collocation; None if they were not kept.
     """
 
     folder: Path
     metrics: dict[str, Any]
     motion: PhasedMotion
     config: StudyConfig
+    multipliers: Multipliers | None = None
 
 
 def config_text(config: StudyConfig) -> str:
@@ -99,6 +106,9 @@ def write_run(
         (staging / "log.txt").write_text("".join(f"{line}\n" for line in log), encoding="utf-8")
         write_motion(staging / _MOTION, solution.last_motion)
         metrics["motion_hash"] = sha256((staging / _MOTION).read_bytes())
+        if solution.converged and solution.config.transcription == "collocation":
+            write_multipliers(staging / _MULTIPLIERS, solution.nlp.multipliers)
+            metrics["multipliers_hash"] = sha256((staging / _MULTIPLIERS).read_bytes())
         _write_series(staging, solution.last_iterate)
         if not solution.converged:
             (staging / _SEAL).write_text(_seal(solution), encoding="utf-8")
@@ -204,17 +214,25 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
             f"{folder}: {metrics['problem']} did not converge there ({metrics['status']}); "
             "its last iterate is no solution"
         )
-    path = folder / _MOTION
-    motion = read_motion(path)
-    if sha256(path.read_bytes()) != metrics["motion_hash"]:
-        raise DataError("does not belong to metrics.json beside it", where=str(path),
-                        mend="solve again")  # fmt: skip
+    motion = read_motion(folder / _MOTION)
+    _check_hash(folder / _MOTION, metrics["motion_hash"])
+    multipliers = None
+    if (folder / _MULTIPLIERS).exists():
+        multipliers = read_multipliers(folder / _MULTIPLIERS)
+        _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
     config = load_config(_file(folder, _CONFIG))
     expected = len(STIFFNESSES) if config.condition == "orthosis" else 0
     if config.problem != metrics["problem"] or motion.parameters.size != expected:
         where = str(folder / _CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)
-    return Run(folder, metrics, motion, config)
+    return Run(folder, metrics, motion, config, multipliers)
+
+
+def _check_hash(path: Path, expected: str | None) -> None:
+    """Refuse a file that is not the one that was written with `metrics.json`."""
+    if sha256(path.read_bytes()) != expected:
+        raise DataError("does not belong to metrics.json beside it", where=str(path),
+                        mend="solve again")  # fmt: skip
 
 
 def _file(folder: Path, name: str) -> Path:

@@ -20,7 +20,8 @@ from pathwalker_cli.reproduce.inverse_study import (
 )
 from pathwalker_cli.reproduce.page import page_text
 from pathwalker_cli.reproduce.plan import check_folder, planned_studies
-from pathwalker_cli.reproduce.results import Results, evaluated, is_done, recordings
+from pathwalker_cli.reproduce.results import Results, evaluated, recordings
+from pathwalker_cli.studies.run import is_done
 
 __all__ = ["PAGE", "Say", "Solve", "reproduce"]
 

@@ -8,6 +8,7 @@ from typing import Final
 from pathwalker_cli.config import StudyConfig, load_config, smoke_version
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.output.run_folder import check_target
+from pathwalker_cli.studies.base import check_folder as check_own_folder
 
 __all__ = ["ENTRIES", "ORDER", "SEVERAL", "check_folder", "planned_studies"]
 
@@ -49,17 +50,7 @@ def check_folder(folder: Path) -> None:
     Raises:
         DataError: If it is a file, cannot be written, or holds something else.
     """
-    if folder.exists() and not folder.is_dir():
-        raise DataError("is a file, not a folder", where=str(folder), mend="choose another --out")
-    found = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    foreign = sorted(name for name in found - ENTRIES if not name.startswith("."))
-    if foreign:
-        raise DataError(
-            f"is not empty and holds {foreign[0]}, which is no result of this command",
-            where=str(folder),
-            allowed="a new folder, or one that an earlier `pathwalker reproduce` began",
-            mend="choose another --out",
-        )
+    check_own_folder(folder, ENTRIES, "reproduce")
     for name in ENTRIES - {"results.md"}:
         if (folder / name).exists() and not (folder / name).is_dir():
             raise DataError("is a file, not a folder", where=str(folder / name), mend="remove it")

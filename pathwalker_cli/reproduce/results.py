@@ -7,21 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.conventions import CONDITIONS, Condition
-from pathwalker_cli.errors import DataError
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.paper import PATIENT
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
 from pathwalker_cli.evaluation.run import gait_of_series
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.series import GaitSeries, gait_series
-from pathwalker_cli.output.run_folder import config_text, load_run
-from pathwalker_cli.output.run_metrics import run_inputs
+from pathwalker_cli.output.run_folder import load_run
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce.inverse_study import InverseResult
 
-__all__ = ["ProblemResult", "Results", "evaluated", "is_done", "recordings"]
+__all__ = ["ProblemResult", "Results", "evaluated", "recordings"]
 
 
 @dataclass(frozen=True)
@@ -91,23 +89,6 @@ def recordings() -> dict[Condition, RecordedGait]:
     return found
 
 
-def is_done(folder: Path, study: StudyConfig) -> bool:
-    """Return whether a folder holds a converged run of just this study.
-
-    A run that is damaged, did not converge, or was made from another config or patient file
-    is not done.
-    """
-    try:
-        run = load_run(folder, allow_unconverged=True)
-        same = config_text(run.config) == config_text(study)
-    except DataError:
-        return False
-    now = run_inputs("", load_patient(study.patient)).hashes.get("patient")
-    then = run.metrics.get("input_hashes", {}).get("patient")
-    sealed = (folder / "NOT_CONVERGED.txt").exists()
-    return same and run.metrics["status"] == "converged" and now == then and not sealed
-
-
 def evaluated(
     folder: Path, kept: bool, recorded: Mapping[Condition, RecordedGait]
 ) -> ProblemResult:
@@ -123,7 +104,7 @@ def evaluated(
     result = ProblemResult(config.problem, metrics, config, kept)
     if metrics["status"] != "converged":
         return result
-    patient = load_patient(config.patient)
+    patient = study_patient(config)
     walker = build_walker(patient, config.condition, config.model.published)
     series = gait_series(walker, run.motion)
     gait = gait_of_series(series, config.problem, config.problem, metrics["effort"])

@@ -1,0 +1,157 @@
+"""Solve neighbours of a solved problem: same structure and mesh, other numbers, warm start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult, NlpSolver
+from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.ocp.series import GaitSeries, gait_series
+from pathwalker_cli.ocp.solution import GaitSolution
+from pathwalker_cli.ocp.solve import GaitSolver
+from pathwalker_cli.ocp.symmetry import full_stride
+from pathwalker_cli.ocp.verify import Reintegration, reintegrate
+
+__all__ = ["Optimum", "Resolver"]
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A solved neighbour.
+
+    Args:
+        solver: The solver of its config; it brings in walker, bounds and numbers.
+        program: The nonlinear program.
+        result: How the solve of it ended.
+    """
+
+    solver: GaitSolver
+    program: CollocationProgram
+    result: NlpResult
+
+    @property
+    def config(self) -> StudyConfig:
+        """What was asked for."""
+        return self.solver.config
+
+    @property
+    def converged(self) -> bool:
+        """Whether the tolerances were met."""
+        return self.result.converged
+
+    @property
+    def cost(self) -> float:
+        """Value of the objective."""
+        return self.result.objective
+
+    @cached_property
+    def motion(self) -> PhasedMotion:
+        """The motion of a whole stride."""
+        motion = self.program.to_motion(self.result.unknowns)
+        return full_stride(motion) if self.config.half_cycle else motion
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """K_D right, left, K_P right, left [N m/rad], shape (4,); empty when barefoot."""
+        return self.motion.parameters
+
+    @cached_property
+    def series(self) -> GaitSeries:
+        """Time series of the stride."""
+        return gait_series(self.solver.walker, self.motion)
+
+    @cached_property
+    def reintegration(self) -> Reintegration:
+        """Errors of an independent integrator: the mesh was made for another problem."""
+        return reintegrate(self.solver.walker, self.motion)
+
+    @property
+    def solution(self) -> GaitSolution:
+        """The same as the end of a solve, e.g. for a run folder."""
+        return self.solver.restored(self.result, self.program.meshes)
+
+
+class Resolver:
+    """Solves problems near an optimum on its mesh; derivatives and solver are built once.
+
+    Args:
+        config: The config of the optimum.
+        motion: Its motion.
+        multipliers: Its multipliers; without them the optimum is solved anew from its motion.
+        tolerance: Optimality tolerance of all solves; that of the config if left out.
+    """
+
+    def __init__(
+        self,
+        config: StudyConfig,
+        motion: PhasedMotion,
+        multipliers: Multipliers | None = None,
+        tolerance: float | None = None,
+    ) -> None:
+        self._solver = GaitSolver(config)
+        self._tolerance = tolerance or config.solver.tolerance
+        steps = motion.phases[: len(self._solver.gait.phases)]
+        self._motion = replace(motion, phases=steps)
+        self._program = self._program_of(self._solver)
+        self._multipliers = multipliers
+        if multipliers is not None and multipliers.rows.size != self._program.program.rows:
+            self._multipliers = None
+
+    @classmethod
+    def at(cls, optimum: Optimum, tolerance: float | None = None) -> Resolver:
+        """Return a solver of the neighbours of an optimum."""
+        return cls(optimum.config, optimum.motion, optimum.result.multipliers, tolerance)
+
+    @cached_property
+    def optimum(self) -> Optimum:
+        """The optimum itself, solved to the tolerance."""
+        start = self._program.to_unknowns(self._motion)
+        result = (
+            self._near.solve(self._program, start, self._multipliers)
+            if self._multipliers is not None
+            else self._far.solve(self._program, start)
+        )
+        return Optimum(self._solver, self._program, result)
+
+    def resolve(self, config: StudyConfig, start: Optimum | None = None) -> Optimum:
+        """Solve a neighbour.
+
+        Args:
+            config: What differs; problem, model and degree must be those of the optimum.
+            start: Neighbour to begin with; the optimum if left out.
+
+        Returns:
+            Where the solve ended, converged or not.
+        """
+        start = start or self.optimum
+        solver = GaitSolver(config)
+        program = self._program_of(solver)
+        result = self._near.solve(program, start.result.unknowns, start.result.multipliers)
+        if not result.converged and result.status != "stopped by the user":
+            result = self._far.solve(program, start.result.unknowns)
+        return Optimum(solver, program, result)
+
+    def _program_of(self, solver: GaitSolver) -> CollocationProgram:
+        return CollocationProgram(solver.blocks, solver.prediction, self._motion.meshes)
+
+    @cached_property
+    def _near(self) -> NlpSolver:
+        """From multipliers."""
+        barrier = self._solver.config.solver.refined_barrier
+        settings = self._solver.settings(self._tolerance, barrier, warm=True)
+        return NlpSolver(self._program, replace(settings, max_iterations=_NEAR_ITERATIONS))
+
+    @cached_property
+    def _far(self) -> NlpSolver:
+        """Where the neighbour is too far for the multipliers to help."""
+        barrier = self._solver.config.solver.warm_barrier
+        return NlpSolver(self._program, self._solver.settings(self._tolerance, barrier))
+
+
+_NEAR_ITERATIONS = 80
+"""Iterations after which a warm start is given up; most take about ten."""

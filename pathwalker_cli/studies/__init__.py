@@ -1,0 +1,1 @@
+"""Studies of many related solves: perturbation, sensitivity, landscape, trade-off, cohorts."""

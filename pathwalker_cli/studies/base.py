@@ -1,0 +1,139 @@
+"""What every study begins with: its own config, and the optimum whose neighbours it solves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import Field
+
+from pathwalker_cli.config import StudyConfig, apply_change, find_config, load_config
+from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
+from pathwalker_cli.io.fields import YamlModel
+from pathwalker_cli.io.yaml_file import read_mapping, validate
+from pathwalker_cli.ocp.resolve import Resolver
+from pathwalker_cli.output.run_folder import Run, load_run
+from pathwalker_cli.studies.run import RunLog, is_done, run_study
+
+__all__ = ["NeighbourStudy", "base_run", "check_folder", "load_study", "resolver_of", "with_values"]
+
+BASE = "base"
+"""Folder of the run that a study begins with, in the study's own folder."""
+
+
+class NeighbourStudy(YamlModel):
+    """A study around one optimum.
+
+    `base` is the config of the problem, `set` overrides its values by dotted key.
+    """
+
+    base: str
+    set: dict[str, Any] = Field(default_factory=dict)
+
+
+Study = TypeVar("Study", bound=YamlModel)
+
+
+def load_study(path: str | Path, model: type[Study], changes: tuple[str, ...] = ()) -> Study:
+    """Read the config of a study; a path in `base` becomes a full one.
+
+    Args:
+        path: The YAML file, or the name of a shipped one.
+        model: Model of its content.
+        changes: Overrides "dotted.key=value" of the study's own keys.
+
+    Raises:
+        ConfigError: If file or overrides are wrong.
+    """
+    source = find_config(Path(path))
+    mapping, lines = read_mapping(source, ConfigError)
+    for change in changes:
+        apply_change(mapping, change)
+    study = validate(mapping, model, where=str(path), error=ConfigError, lines=lines)
+    base = getattr(study, "base", "")
+    beside = source.parent / base
+    return (
+        study.model_copy(update={"base": str(beside.resolve())})
+        if base and beside.is_file()
+        else study
+    )
+
+
+def base_config(study: NeighbourStudy) -> StudyConfig:
+    """Return the config of the problem that a study is about.
+
+    Raises:
+        ConfigError: If there is no such config, or it is wrong.
+    """
+    return with_values(load_config(study.base), study.set, f"set of the study on {study.base}")
+
+
+def with_values(config: StudyConfig, values: Mapping[str, Any], where: str = "") -> StudyConfig:
+    """Return a config with some values replaced and validated anew.
+
+    Args:
+        config: The config.
+        values: New values by dotted key, e.g. {"cost.walking_speed_weight": 1.0}.  A key of
+            `variation` is no path: "variation.scale" takes a mapping.
+        where: Origin of the values, for the message.
+
+    Raises:
+        ConfigError: If a key does not exist or a value is refused.
+    """
+    content: dict[str, Any] = config.model_dump(mode="json")
+    for key, value in values.items():
+        *parents, last = key.split(".")
+        holder = content
+        for parent in parents:
+            holder = holder.setdefault(parent, {})
+            if not isinstance(holder, dict):
+                raise ConfigError(f"'{parent}' holds no keys", where=f"{where}, {key}")
+        holder[last] = value
+    return validate(content, StudyConfig, where=where or "overrides", error=ConfigError)
+
+
+def base_run(study: StudyConfig, folder: Path, log: RunLog | None = None) -> Run:
+    """Return the converged run of a study in a folder; it is solved unless it is there.
+
+    Raises:
+        NotConvergedError: If it does not converge: there is nothing to stand on then.
+        DataError: If the folder holds something else.
+    """
+    if not is_done(folder, study):
+        solution, _ = run_study(study, folder, log=log)
+        if not solution.converged:
+            raise NotConvergedError(
+                f"{study.problem}, on which the study stands, did not converge: "
+                f"{solution.status}; its last iterate is in {folder}"
+            )
+    return load_run(folder)
+
+
+def resolver_of(run: Run, tolerance: float | None = None) -> Resolver:
+    """Return a solver of the neighbours of a run."""
+    return Resolver(run.config, run.motion, run.multipliers, tolerance)
+
+
+def check_folder(folder: Path, entries: frozenset[str], command: str) -> None:
+    """Refuse a folder that cannot take the results, before anything is computed.
+
+    Args:
+        folder: Where results shall go.
+        entries: Names of all files and folders that the command writes there.
+        command: The command, for the message.
+
+    Raises:
+        DataError: If it is a file or holds something else.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise DataError("is a file, not a folder", where=str(folder), mend="choose another --out")
+    found = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    foreign = sorted(name for name in found - entries if not name.startswith("."))
+    if foreign:
+        raise DataError(
+            f"is not empty and holds {foreign[0]}, which is no result of this command",
+            where=str(folder),
+            allowed=f"a new folder, or one that an earlier `pathwalker {command}` began",
+            mend="choose another --out",
+        )

@@ -1,0 +1,112 @@
+"""One study into one run folder: what a command, a batch and the reproduction all do."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.ocp.by_shooting import solve_by_shooting
+from pathwalker_cli.ocp.ipopt import ProgressReport
+from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
+from pathwalker_cli.ocp.solve import GaitSolver
+from pathwalker_cli.ocp.starts import solve_from_starts
+from pathwalker_cli.output.run_folder import (
+    Run,
+    check_target,
+    config_text,
+    load_run,
+    warm_start_run,
+    write_run,
+)
+from pathwalker_cli.output.run_metrics import RunInputs, run_inputs
+
+__all__ = ["RunLog", "is_done", "run_study"]
+
+
+class RunLog:
+    """Keeps every iteration and every start of a solve as `lines`."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self._began = time.perf_counter()
+
+    def __call__(self, stage: str, report: ProgressReport) -> None:
+        """Take note of one iteration."""
+        elapsed = time.perf_counter() - self._began
+        self.lines.append(
+            f"{stage:<10} iteration {report.iteration:4d}   cost {report.objective:<11.5g} "
+            f"infeasibility {report.infeasibility:.1e}   {elapsed:6.1f} s"
+        )
+
+    def optimum(self, found: LocalOptimum) -> None:
+        """Take note of where one of several starts ended."""
+        self.lines.append(
+            f"start {found.start:<3d} {found.status}, cost {found.cost:.5g}, "
+            f"{found.walking_speed:.3f} m/s, {found.iterations} iterations, {found.description}"
+        )
+
+
+def run_study(
+    study: StudyConfig, folder: Path, warm_start: Path | None = None, log: RunLog | None = None
+) -> tuple[GaitSolution, dict[str, Any]]:
+    """Solve a study and write its run folder; return how it ended and the metrics.
+
+    Args:
+        study: The study.
+        folder: The run folder; an earlier run in it is replaced.
+        warm_start: Folder of an earlier run to begin with.
+        log: Is told of every iteration.
+
+    Raises:
+        DataError: If the folder holds something else, or the earlier run cannot be used.
+    """
+    log = log or RunLog()
+    check_target(folder)
+    earlier = None if warm_start is None else warm_start_run(warm_start, study)
+    inputs = run_inputs(config_text(study), study_patient(study), warm_start)
+    solution = _solve(study, earlier, log)
+    return solution, write_run(folder, solution, _log_lines(solution, inputs, log), inputs)
+
+
+def is_done(folder: Path, study: StudyConfig) -> bool:
+    """Return whether a folder holds a converged run of just this study.
+
+    A run that is damaged, did not converge, or was made from another config or patient file
+    is not done.
+    """
+    try:
+        run = load_run(folder, allow_unconverged=True)
+        same = config_text(run.config) == config_text(study)
+    except DataError:
+        return False
+    now = run_inputs("", study_patient(study)).hashes.get("patient")
+    then = run.metrics.get("input_hashes", {}).get("patient")
+    sealed = (folder / "NOT_CONVERGED.txt").exists()
+    return same and run.metrics["status"] == "converged" and now == then and not sealed
+
+
+def _solve(study: StudyConfig, earlier: Run | None, log: RunLog) -> GaitSolution:
+    """Solve a study, from an earlier run if there is one."""
+    motion = None if earlier is None else earlier.motion
+    if study.transcription == "multiple-shooting":
+        return solve_by_shooting(GaitSolver(study, log), motion)
+    if study.starts > 1 and motion is None:
+        return solve_from_starts(study, log.optimum)
+    return GaitSolver(study, log).solve(motion)
+
+
+def _log_lines(solution: GaitSolution, inputs: RunInputs, log: RunLog) -> list[str]:
+    """Return the lines of `log.txt`: every iteration, then every stage."""
+    lines = [f"{solution.config.problem}, patient {solution.walker.patient.id}"]
+    lines += [f"{name} sha256 {value}" for name, value in inputs.hashes.items()]
+    lines += log.lines
+    for stage in solution.stages:
+        lines.append(
+            f"stage {stage.name}: {stage.status}; {stage.intervals} intervals, "
+            f"{stage.unknowns} unknowns, {stage.iterations} iterations, {stage.seconds:.2f} s, "
+            f"of which {stage.seconds_functions:.2f} s in functions"
+        )
+    return [*lines, f"status: {solution.status}"]
