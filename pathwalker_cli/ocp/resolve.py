@@ -136,6 +136,11 @@ class Resolver:
             result = self._far.solve(program, start.result.unknowns)
         return Optimum(solver, program, result)
 
+    def restored(self, config: StudyConfig, result: NlpResult) -> Optimum:
+        """Return a neighbour that was solved before."""
+        solver = GaitSolver(config)
+        return Optimum(solver, self._program_of(solver), result)
+
     def _program_of(self, solver: GaitSolver) -> CollocationProgram:
         return CollocationProgram(solver.blocks, solver.prediction, self._motion.meshes)
 

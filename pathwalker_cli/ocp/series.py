@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, fields
+from functools import cache, cached_property
 
 import casadi as ca
 import numpy as np
 
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES
 from pathwalker_cli.model.contact import phase_named
-from pathwalker_cli.model.muscle import excitation_from_rate
-from pathwalker_cli.model.orthosis import orthosis_torque
+from pathwalker_cli.model.muscle import excitation_from_rate, generators
+from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
 from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
@@ -106,17 +106,36 @@ def actuator_torques(walker: Walker) -> ca.Function:
 
     The stiffness is (K_D right, left, K_P right, left) [N m/rad], empty for a barefoot walker.
     """
+    sides = walker.orthosis or ()
+    general = _torques(len(sides))
+    inputs = [ca.SX.sym(name, general.size1_in(i)) for i, name in enumerate("qvak")]
+    numbers = np.array([value for side in sides for value in vars(side).values()])
+    outputs = general.call([*inputs, walker.max_isometric_torque, numbers], True, False)
+    return ca.Function("torques", inputs, outputs)
+
+
+@cache
+def _torques(sides: int) -> ca.Function:
+    """Return the torques of any walker: strengths and orthosis parameters are inputs too."""
     q, v, a = (ca.SX.sym(name, size) for name, size in (("q", 10), ("v", 10), ("a", 14)))
-    k = ca.SX.sym("k", 4 if walker.orthosis else 0)
+    k, strength = ca.SX.sym("k", 2 * sides), ca.SX.sym("strength", len(GENERATOR_ROWS))
+    numbers = ca.SX.sym("orthosis", sides * len(fields(OrthosisSide)))
     muscle = [
-        g.torque(q[row], v[row], a[i], walker.max_isometric_torque[i])
-        for i, (g, row) in enumerate(zip(walker.generators, GENERATOR_ROWS, strict=True))
+        g.torque(q[row], v[row], a[i], strength[i])
+        for i, (g, row) in enumerate(zip(generators(), GENERATOR_ROWS, strict=True))
     ]
+    worn = [OrthosisSide(*ca.vertsplit(part)) for part in _halves(numbers, sides)]
     orthosis = [
         orthosis_torque(side, q[row], k[i], k[i + 2])
-        for i, (side, row) in enumerate(zip(walker.orthosis or (), ANKLES, strict=False))
+        for i, (side, row) in enumerate(zip(worn, ANKLES, strict=False))
     ] or [ca.SX(0), ca.SX(0)]
-    return ca.Function("torques", [q, v, a, k], [ca.vertcat(*muscle), ca.vertcat(*orthosis)])
+    inputs = [q, v, a, k, strength, numbers]
+    return ca.Function("torques", inputs, [ca.vertcat(*muscle), ca.vertcat(*orthosis)])
+
+
+def _halves(numbers: ca.SX, sides: int) -> list[ca.SX]:
+    """Return the orthosis parameters of each side."""
+    return ca.vertsplit(numbers, numbers.numel() // sides) if sides else []
 
 
 def gait_series(walker: Walker, motion: PhasedMotion) -> GaitSeries:
