@@ -28,8 +28,8 @@ if it comes with PathWalker, by its name alone (`mapd-orthosis`); its keys are i
 
 | exit code | meaning |
 | --- | --- |
-| 0 | done; of `solve` and `reproduce`: converged; of `doctor`: ready |
-| {not_converged} | `solve`, `reproduce`: not converged; `doctor`: something needed is missing |
+| 0 | done; of `solve`, `batch` and `reproduce`: converged; of `doctor`: ready |
+| {not_converged} | `solve`, `batch`, `reproduce`: not converged; `doctor`: something is missing |
 | {refused} | bad input: one sentence on stderr says what, where and how to mend it |
 | {stopped} | Ctrl-C before there was anything to keep |
 

@@ -22,12 +22,22 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematicsConfig
 from pathwalker_cli.io.fields import Quantity
 from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.studies.batch.schema import BatchStudy
+from pathwalker_cli.studies.landscape_study import LandscapeStudy
+from pathwalker_cli.studies.perturbation import PerturbationStudy
+from pathwalker_cli.studies.tradeoff import TradeoffStudy
+from pathwalker_cli.studies.uncertainty import UncertaintyStudy
 
 PAGE: Final = Path(__file__).with_name("configuration.md")
 CONFIGS: Final = PAGE.parent.parent / "configs"
 
 STUDIES: Final[tuple[tuple[str, str, type[BaseModel]], ...]] = (
     ("Predictions", "mapd-orthosis.yaml", StudyConfig),
+    ("Many cases", "cohort.yaml", BatchStudy),
+    ("Softer and stiffer springs", "perturbation.yaml", PerturbationStudy),
+    ("Uncertain numbers of the patient", "uncertainty.yaml", UncertaintyStudy),
+    ("Cost over the springs", "landscape.yaml", LandscapeStudy),
+    ("Effort against speed", "tradeoff.yaml", TradeoffStudy),
     ("Recorded gait: angles", "inverse-kinematics.yaml", InverseKinematicsConfig),
     ("Recorded gait: torques and strengths", "inverse-dynamics.yaml", InverseDynamicsConfig),
 )
@@ -56,6 +66,7 @@ _KINDS: Final[dict[Any, str]] = {
     int: "whole number",
     bool: "true or false",
     str: "text",
+    Any: "any value",
 }
 
 
@@ -112,7 +123,8 @@ def _tables(model: type[BaseModel], why: dict[str, str]) -> Iterator[str]:
 def _table(fields: dict[str, FieldInfo], prefix: str, why: dict[str, str]) -> str:
     """Return a table of keys."""
     lines = ["| key | type | allowed | default | what and why |", "| --- | --- | --- | --- | --- |"]
-    for name, field in fields.items():
+    for field_name, field in fields.items():
+        name = field.alias or field_name
         kind, allowed = _described(field.annotation, list(field.metadata))
         allowed = ALLOWED.get(name, allowed)
         reason = why.get(f"{prefix}{name}", "not in the shipped file")
@@ -134,6 +146,8 @@ def _described(annotation: Any, metadata: list[Any]) -> tuple[str, str]:
         return _KINDS[annotation], f"{lowest} to {highest}"
     if annotation in _KINDS:
         return _KINDS[annotation], ""
+    if _is_model(annotation):
+        return f"block of {', '.join(annotation.model_fields)}", ""
     return _composed(get_origin(annotation), get_args(annotation))
 
 
@@ -151,7 +165,7 @@ def _composed(origin: Any, parts: tuple[Any, ...]) -> tuple[str, str]:
         kind, allowed = _described(parts[1], [])
         return f"{kind} per name", allowed
     kind, allowed = _described(parts[0], [])
-    if parts[1] is Ellipsis:
+    if len(parts) == 1 or parts[1] is Ellipsis:
         return f"list of {kind}", allowed
     return kind.replace("number", "[lower, upper]"), allowed
 

@@ -25,6 +25,21 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "solve_command",
         "Predict the gait of a patient by optimal control.",
     ),
+    "perturb": (
+        "pathwalker_cli.commands.perturb",
+        "perturb_command",
+        "Move every orthosis spring a little and see what changes.",
+    ),
+    "sensitivity": (
+        "pathwalker_cli.commands.sensitivity",
+        "sensitivity_command",
+        "Tell what one percent of every number of patient and orthosis changes.",
+    ),
+    "uncertainty": (
+        "pathwalker_cli.commands.uncertainty",
+        "uncertainty_command",
+        "Draw the uncertain numbers of a patient and see how far the answers spread.",
+    ),
     "evaluate": (
         "pathwalker_cli.commands.evaluate",
         "evaluate_command",
@@ -34,6 +49,21 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "pathwalker_cli.commands.reproduce",
         "reproduce_command",
         "Reproduce the article from the shipped data, with one page of results.",
+    ),
+    "batch": (
+        "pathwalker_cli.commands.batch",
+        "batch_command",
+        "Solve every case of a study: patients, problems and overrides in any number.",
+    ),
+    "landscape": (
+        "pathwalker_cli.commands.landscape",
+        "landscape_command",
+        "Map the cost over the spring stiffnesses of a side.",
+    ),
+    "tradeoff": (
+        "pathwalker_cli.commands.tradeoff",
+        "tradeoff_command",
+        "Find what walking faster costs, and which springs suit which speed.",
     ),
     "model": (
         "pathwalker_cli.commands.model",

@@ -33,6 +33,7 @@ __all__ = [
     "patient_path",
     "smoke_version",
     "study_patient",
+    "with_values",
 ]
 
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
@@ -215,6 +216,7 @@ class StudyConfig(YamlModel):
     transcription: Literal["collocation", "multiple-shooting"] = "collocation"
     half_cycle: bool = False
     starts: Annotated[int, Field(ge=1, le=1000)] = 1
+    verdict: bool = True
     smoke: bool = False
 
     @model_validator(mode="before")
@@ -298,7 +300,7 @@ def load_config(path: str | Path, problem: str = "", changes: tuple[str, ...] = 
 
 def find_config(path: Path) -> Path:
     """Return the file, or the shipped config of that name where there is no such file."""
-    if not path.exists():
+    if not path.is_file():
         for name in (path.name, f"{path.name}.yaml"):
             candidate = shipped("configs") / name
             if candidate.is_file() and path.parent.name in ("", "configs"):
@@ -336,9 +338,36 @@ def apply_change(mapping: dict[str, Any], change: str) -> None:
     mapping[last] = value
 
 
+def with_values(config: StudyConfig, values: Mapping[str, Any], where: str = "") -> StudyConfig:
+    """Return a config with some values replaced and validated anew.
+
+    Args:
+        config: The config.
+        values: New values by dotted key, e.g. {"cost.walking_speed_weight": 1.0}.  A mapping at a
+            section, e.g. {"mesh": {...}}, replaces only what it names; one below a section, e.g.
+            {"variation.scale": {...}}, takes the place of what was there.
+        where: Origin of the values, for the message.
+
+    Raises:
+        ConfigError: If a key does not exist or a value is refused.
+    """
+    content: dict[str, Any] = config.model_dump(mode="json")
+    for key, value in values.items():
+        *parents, last = key.split(".")
+        holder = content
+        for parent in parents:
+            holder = holder.setdefault(parent, {})
+            if not isinstance(holder, dict):
+                raise ConfigError(f"'{parent}' holds no keys", where=f"{where}, {key}")
+        whole = isinstance(value, Mapping) and not parents and isinstance(holder.get(last), dict)
+        holder[last] = merged(holder[last], value) if whole else value
+    return validate(content, StudyConfig, where=where or "overrides", error=ConfigError)
+
+
 def smoke_version(config: StudyConfig) -> StudyConfig:
     """Return a config with a short horizon for quick checks: coarse mesh, no refinement."""
     mesh = config.mesh.model_copy(update={"intervals": (2,) * len(PHASE_NAMES), "refinements": 0})
     loose = {"max_iterations": min(400, config.solver.max_iterations), "tolerance": 1e-3}
     solver = config.solver.model_copy(update=loose)
-    return config.model_copy(update={"mesh": mesh, "solver": solver, "smoke": True})
+    changes = {"mesh": mesh, "solver": solver, "smoke": True, "verdict": False}
+    return config.model_copy(update=changes)

@@ -15,7 +15,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from pathwalker_cli.conventions import SIDES, Condition
 from pathwalker_cli.errors import PatientError
 from pathwalker_cli.io.fields import Quantity, Sides, YamlModel, invalid
-from pathwalker_cli.io.yaml_file import load_yaml
+from pathwalker_cli.io.yaml_file import load_yaml, read_mapping, validate
 from pathwalker_cli.model.proportions import (
     ANKLE_HEIGHT,
     HEEL_SHARE,
@@ -71,6 +71,7 @@ class Patient(YamlModel):
     orthosis: OrthosisData | None = None
     recorded: dict[Condition, Recorded] = Field(default_factory=dict)
     _source: Path | None = PrivateAttr(default=None)
+    _orthosis_source: Path | None = PrivateAttr(default=None)
     _changes: tuple[str, ...] = PrivateAttr(default=())
 
     @field_validator("id")
@@ -107,6 +108,12 @@ class Patient(YamlModel):
     def source(self) -> Path | None:
         """The file this was read from."""
         return self._source
+
+    @property
+    def content(self) -> bytes:
+        """The bytes that this was read from: the file, and that of the orthosis if it is apart."""
+        files = (self._source, self._orthosis_source)
+        return b"".join(file.read_bytes() for file in files if file is not None)
 
     @property
     def folder(self) -> Path | None:
@@ -208,14 +215,21 @@ def load_patient(id_or_path: str | Path) -> Patient:
     """Read a patient.
 
     Args:
-        id_or_path: A shipped id, a folder with `patient.yaml`, or a YAML file.
+        id_or_path: A shipped id, a folder with `patient.yaml`, or a YAML file.  Its `orthosis` may
+            be the path of a file of its own, relative to the patient's.
 
     Raises:
         PatientError: If there is no such patient or its file is refused.
     """
     path = _patient_file(id_or_path)
-    patient = load_yaml(path, Patient, PatientError)
-    patient._source = path
+    mapping, lines = read_mapping(path, PatientError)
+    worn, apart = mapping.get("orthosis"), None
+    if isinstance(worn, str):
+        apart = path.parent / worn
+        orthosis = load_yaml(apart, OrthosisData, PatientError)
+        mapping = {**mapping, "orthosis": orthosis.model_dump(mode="json", exclude_none=True)}
+    patient = validate(mapping, Patient, where=str(path), error=PatientError, lines=lines)
+    patient._source, patient._orthosis_source = path, apart
     return patient
 
 

@@ -18,10 +18,12 @@ __all__ = [
     "FootPoints",
     "LengthRange",
     "OrthosisData",
+    "RealSpring",
     "Recorded",
     "SegmentLengths",
     "SpeedRange",
     "SpringRange",
+    "SpringSet",
     "Springs",
     "Strengths",
 ]
@@ -135,6 +137,29 @@ class SpringRange(YamlModel):
     source: str = Field(min_length=1)
 
 
+class RealSpring(YamlModel):
+    """A spring that can be bought: its name and its stiffness at the joint [N m/rad]."""
+
+    name: str = Field(min_length=1, max_length=40)
+    stiffness: Stiffness
+
+
+class SpringSet(YamlModel):
+    """The springs that exist for each direction, and who says so."""
+
+    dorsiflexion: Annotated[tuple[RealSpring, ...], AS_TUPLE, Field(min_length=1)]
+    plantarflexion: Annotated[tuple[RealSpring, ...], AS_TUPLE, Field(min_length=1)]
+    source: str = Field(min_length=1)
+
+    @field_validator("dorsiflexion", "plantarflexion")
+    @classmethod
+    def _apart(cls, value: tuple[RealSpring, ...]) -> tuple[RealSpring, ...]:
+        names, sizes = {spring.name for spring in value}, {spring.stiffness for spring in value}
+        if min(len(names), len(sizes)) < len(value):
+            raise invalid("names a spring, or a stiffness, twice", allowed="different springs")
+        return value
+
+
 class OrthosisData(YamlModel):
     """Ankle-foot orthosis: geometry and springs, angles in rad (+ = plantarflexion)."""
 
@@ -163,6 +188,7 @@ class OrthosisData(YamlModel):
     stop_stiffness: Springs
     stiffness_guess: Springs
     stiffness_range: SpringRange
+    springs: SpringSet | None = None
 
     @model_validator(mode="after")
     def _springs(self) -> OrthosisData:

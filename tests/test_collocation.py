@@ -22,7 +22,7 @@ from pathwalker_cli.ocp.problem import (
 )
 
 
-def _double_integrator(nonlinear: bool = False) -> tuple[MultiPhaseProblem, ProblemNumbers]:
+def double_integrator(nonlinear: bool = False) -> tuple[MultiPhaseProblem, ProblemNumbers]:
     """Return: move a unit mass by 1 m from rest to rest in 1 s with least integral of force^2.
 
     Two phases of 0.5 s; the force is the algebraic variable; optimum 12 (closed form), force
@@ -82,7 +82,7 @@ def _exponential(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     return value, value, value
 
 
-def _rest(problem: MultiPhaseProblem, intervals: int, degree: int) -> PhasedMotion:
+def at_rest(problem: MultiPhaseProblem, intervals: int, degree: int) -> PhasedMotion:
     """Return a start at rest."""
     n = intervals
     phases = tuple(
@@ -104,8 +104,8 @@ def _rest(problem: MultiPhaseProblem, intervals: int, degree: int) -> PhasedMoti
 
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_double_integrator_reaches_the_closed_form_optimum(nonlinear: bool) -> None:
-    problem, numbers = _double_integrator(nonlinear)
-    start = _rest(problem, 3, 3)
+    problem, numbers = double_integrator(nonlinear)
+    start = at_rest(problem, 3, 3)
     program = CollocationProgram(CollocationBlocks(problem, 3), numbers, start.meshes)
     result = solve_program(program, program.to_unknowns(start), IpoptSettings(tolerance=1e-9))
     assert result.converged
@@ -121,8 +121,8 @@ def test_double_integrator_reaches_the_closed_form_optimum(nonlinear: bool) -> N
 
 
 def test_block_derivatives_agree_with_those_of_the_whole() -> None:
-    problem, numbers = _double_integrator(nonlinear=True)
-    start = _rest(problem, 2, 3)
+    problem, numbers = double_integrator(nonlinear=True)
+    start = at_rest(problem, 2, 3)
     program = CollocationProgram(CollocationBlocks(problem, 3), numbers, start.meshes)
     functions = program.program.functions()
     rng = np.random.default_rng(1)

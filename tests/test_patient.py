@@ -187,3 +187,26 @@ def test_exponents_without_a_point_are_numbers(tmp_path: Path) -> None:
     assert read_mapping(file)[0] == {
         "a": 1e-4, "b": 2500.0, "c": 7, "d": 0.5, "e": "2020-01-01", "f": 1.0,
     }  # fmt: skip
+
+
+def test_an_orthosis_may_have_a_file_of_its_own(tmp_path: Path) -> None:
+    shipped = load_patient("sreenivasa2017-patient")
+    assert shipped.source is not None
+    content = yaml.safe_load(shipped.source.read_text(encoding="utf-8"))
+    worn = content["orthosis"]
+    (tmp_path / "spring.yaml").write_text(yaml.safe_dump(worn), encoding="utf-8")
+    content["orthosis"] = "spring.yaml"
+    child = tmp_path / "child.yaml"
+    child.write_text(yaml.safe_dump(content), encoding="utf-8")
+    patient = load_patient(child)
+    assert patient.orthosis == shipped.orthosis
+    before = patient.content
+    (tmp_path / "spring.yaml").write_text(
+        yaml.safe_dump({**worn, "neutral_angle": 5.0}), encoding="utf-8"
+    )
+    with pytest.raises(PatientError, match=r"spring\.yaml, line \d+: neutral_angle"):
+        load_patient(child)
+    (tmp_path / "spring.yaml").write_text(
+        yaml.safe_dump({**worn, "neutral_angle": 0.0}), encoding="utf-8"
+    )
+    assert load_patient(child).content != before

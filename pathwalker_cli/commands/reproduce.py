@@ -77,7 +77,7 @@ def _solve(study: StudyConfig, folder: Path, quiet: bool) -> None:
 
     try:
         with Progress(quiet) as progress:
-            solution, _ = run_study(study, folder, log=progress)
+            solution = run_study(study, folder, log=progress).solution
         stopped = solution.status == "stopped by the user"
     except KeyboardInterrupt:
         stopped = True

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rich.console import Console
+
     from pathwalker_cli.config import StudyConfig
-    from pathwalker_cli.ocp.solution import GaitSolution
     from pathwalker_cli.patient import Patient
+    from pathwalker_cli.studies.run import Outcome
 
 __all__ = ["solve_command"]
 
@@ -57,9 +61,10 @@ def solve_command(
     study, patient = _study(problem, config, changes, smoke)
     folder = out or Path("runs") / f"{problem}-{patient.id}"
     with Progress(quiet) as progress:
-        solution, metrics = run_study(study, folder, warm_start, progress)
+        outcome = run_study(study, folder, warm_start, progress)
+    solution = outcome.solution
     if not quiet:
-        _report(solution, metrics, folder)
+        _report(outcome, folder)
     if not solution.converged:
         raise NotConvergedError(failure_text(solution, str(folder)))
 
@@ -86,14 +91,16 @@ def _study(
     return smoke_version(study) if smoke else study, patient
 
 
-def _report(solution: GaitSolution, metrics: dict[str, Any], folder: Path) -> None:
+def _report(outcome: Outcome, folder: Path) -> None:
     """Print the summary of a run."""
     from rich.console import Console
 
     from pathwalker_cli.output.run_metrics import stiffness_ranges
     from pathwalker_cli.output.solve_text import detail_lines, optimum_lines, source_lines
     from pathwalker_cli.output.text import active_bounds, summary, summary_renderable
+    from pathwalker_cli.studies.verdict_text import verdict_lines
 
+    solution, metrics, verdict = outcome
     bounds = active_bounds(metrics, stiffness_ranges(solution)) if solution.converged else ()
     console = Console()
     if console.is_terminal:
@@ -101,9 +108,29 @@ def _report(solution: GaitSolution, metrics: dict[str, Any], folder: Path) -> No
     else:
         click.echo(summary(metrics, solution.status, solution.cost, bounds))
     click.echo()
+    if verdict is not None:
+        click.echo("How sure are the springs?")
+        _echo_rows(console, verdict_lines(verdict))
+        click.echo()
     rows = [*optimum_lines(solution.optima), *detail_lines(solution, metrics)]
     rows += [("bounds", line) for line in source_lines(solution.bounds.sources)]
     rows += [("patient", note) for note in solution.walker.patient.notes]
-    for label, text in rows:
-        click.echo(f"{label:<22}{text}")
+    _echo_rows(console, rows)
     click.echo(f"\nWritten to {folder}")
+
+
+def _echo_rows(console: Console, rows: Iterable[tuple[str, str]]) -> None:
+    """Print labels and texts; on a terminal, long texts stay in their column."""
+    from rich.table import Table
+    from rich.text import Text
+
+    if not console.is_terminal:
+        for label, text in rows:
+            click.echo(f"{label:<22}{text}")
+        return
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="dim", no_wrap=True, width=20)
+    table.add_column()
+    for label, text in rows:
+        table.add_row(label, Text(text))
+    console.print(table)

@@ -107,8 +107,9 @@ def _clauses(problem: Any, path: KeyPath, model_class: type[BaseModel]) -> tuple
     if kind == "value_error":
         return str(context["error"]), "", ""
     if kind in ("too_long", "too_short"):
-        bound = context.get("max_length", context.get("min_length"))
-        return f"has {len(value)} entries", f"{bound}", ""
+        long = kind == "too_long"
+        bound = f"at most {context['max_length']}" if long else f"at least {context['min_length']}"
+        return f"has {len(value)} entries", bound, ""
     message = problem["msg"][0].lower() + problem["msg"][1:]
     return f"is {_shown(value)}", _PLAIN.get(kind, message.removeprefix("input should be ")), ""
 

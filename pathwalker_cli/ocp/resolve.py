@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +19,12 @@ from pathwalker_cli.ocp.symmetry import full_stride
 from pathwalker_cli.ocp.verify import Reintegration, reintegrate
 
 __all__ = ["Optimum", "Resolver"]
+
+_WATCHDOG: Final = {"watchdog_shortened_iter_trigger": 1, "watchdog_trial_iter_max": 30}
+"""A neighbour further off is reached by full steps that the filter alone would cut to nothing."""
+
+_NEAR_ITERATIONS: Final = 100
+"""Iterations after which a warm start is given up; most take about ten."""
 
 
 @dataclass(frozen=True)
@@ -118,12 +125,16 @@ class Resolver:
         )
         return Optimum(self._solver, self._program, result)
 
-    def resolve(self, config: StudyConfig, start: Optimum | None = None) -> Optimum:
+    def resolve(
+        self, config: StudyConfig, start: Optimum | None = None, insist: bool = True
+    ) -> Optimum:
         """Solve a neighbour.
 
         Args:
             config: What differs; problem, model and degree must be those of the optimum.
             start: Neighbour to begin with; the optimum if left out.
+            insist: Whether to try without multipliers, which may take long, where these do not
+                lead to a solution.
 
         Returns:
             Where the solve ended, converged or not.
@@ -132,7 +143,7 @@ class Resolver:
         solver = GaitSolver(config)
         program = self._program_of(solver)
         result = self._near.solve(program, start.result.unknowns, start.result.multipliers)
-        if not result.converged and result.status != "stopped by the user":
+        if insist and not result.converged and result.status != "stopped by the user":
             result = self._far.solve(program, start.result.unknowns)
         return Optimum(solver, program, result)
 
@@ -146,17 +157,15 @@ class Resolver:
 
     @cached_property
     def _near(self) -> NlpSolver:
-        """From multipliers."""
-        barrier = self._solver.config.solver.refined_barrier
+        """From multipliers: the barrier is where the optimum's solve left it."""
+        barrier = min(self._solver.config.solver.refined_barrier, 0.1 * self._tolerance)
         settings = self._solver.settings(self._tolerance, barrier, warm=True)
-        return NlpSolver(self._program, replace(settings, max_iterations=_NEAR_ITERATIONS))
+        extra = {**_WATCHDOG, **settings.extra}
+        near = replace(settings, max_iterations=_NEAR_ITERATIONS, extra=extra)
+        return NlpSolver(self._program, near)
 
     @cached_property
     def _far(self) -> NlpSolver:
         """Where the neighbour is too far for the multipliers to help."""
         barrier = self._solver.config.solver.warm_barrier
         return NlpSolver(self._program, self._solver.settings(self._tolerance, barrier))
-
-
-_NEAR_ITERATIONS = 80
-"""Iterations after which a warm start is given up; most take about ten."""

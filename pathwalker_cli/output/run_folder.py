@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -85,6 +85,7 @@ def write_run(
     solution: GaitSolution,
     log: Sequence[str] = (),
     inputs: RunInputs | None = None,
+    more: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Write a run, converged or not, and return its metrics.
 
@@ -95,12 +96,14 @@ def write_run(
         solution: How the solve ended.
         log: Lines of `log.txt`.
         inputs: What the run was made from; taken now if left out.
+        more: Further entries of `metrics.json`, plain values.
 
     Raises:
         DataError: If the folder holds something else, or cannot be written.
     """
     text = config_text(solution.config)
     metrics = run_metrics(solution, inputs or run_inputs(text, solution.walker.patient))
+    metrics |= more or {}
     with _staged(Path(folder)) as staging:
         (staging / _CONFIG).write_text(text, encoding="utf-8")
         (staging / "log.txt").write_text("".join(f"{line}\n" for line in log), encoding="utf-8")

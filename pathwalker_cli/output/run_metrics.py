@@ -54,7 +54,7 @@ def run_inputs(
     """
     hashes = {"config": sha256(config_text.encode())}
     if patient.source is not None:
-        hashes["patient"] = sha256(patient.source.read_bytes())
+        hashes["patient"] = sha256(patient.content)
     if warm_start is not None:
         hashes["warm_start"] = sha256((Path(warm_start) / "motion.npz").read_bytes())
     return RunInputs(hashes, "" if warm_start is None else str(warm_start))

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import Field
 
-from pathwalker_cli.config import StudyConfig, apply_change, find_config, load_config
+from pathwalker_cli.config import (
+    StudyConfig,
+    apply_change,
+    find_config,
+    load_config,
+    with_values,
+)
 from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
 from pathwalker_cli.io.fields import YamlModel
 from pathwalker_cli.io.yaml_file import read_mapping, validate
@@ -69,30 +74,6 @@ def base_config(study: NeighbourStudy) -> StudyConfig:
     return with_values(load_config(study.base), study.set, f"set of the study on {study.base}")
 
 
-def with_values(config: StudyConfig, values: Mapping[str, Any], where: str = "") -> StudyConfig:
-    """Return a config with some values replaced and validated anew.
-
-    Args:
-        config: The config.
-        values: New values by dotted key, e.g. {"cost.walking_speed_weight": 1.0}.  A key of
-            `variation` is no path: "variation.scale" takes a mapping.
-        where: Origin of the values, for the message.
-
-    Raises:
-        ConfigError: If a key does not exist or a value is refused.
-    """
-    content: dict[str, Any] = config.model_dump(mode="json")
-    for key, value in values.items():
-        *parents, last = key.split(".")
-        holder = content
-        for parent in parents:
-            holder = holder.setdefault(parent, {})
-            if not isinstance(holder, dict):
-                raise ConfigError(f"'{parent}' holds no keys", where=f"{where}, {key}")
-        holder[last] = value
-    return validate(content, StudyConfig, where=where or "overrides", error=ConfigError)
-
-
 def base_run(study: StudyConfig, folder: Path, log: RunLog | None = None) -> Run:
     """Return the converged run of a study in a folder; it is solved unless it is there.
 
@@ -101,7 +82,7 @@ def base_run(study: StudyConfig, folder: Path, log: RunLog | None = None) -> Run
         DataError: If the folder holds something else.
     """
     if not is_done(folder, study):
-        solution, _ = run_study(study, folder, log=log)
+        solution = run_study(study, folder, log=log).solution
         if not solution.converged:
             raise NotConvergedError(
                 f"{study.problem}, on which the study stands, did not converge: "

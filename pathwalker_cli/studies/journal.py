@@ -34,8 +34,8 @@ class Journal:
     def __init__(self, folder: Path, run: Run, resolver: Resolver) -> None:
         self.folder = folder
         self.resolver = resolver
-        inputs = run.metrics.get("input_hashes", {})
-        self._origin = f"{run.metrics['motion_hash']} {inputs.get('patient')}"
+        patient = sha256(resolver.optimum.solver.walker.patient.content)
+        self._origin = f"{run.metrics['motion_hash']} {patient}"
         self.solved = 0
         """Neighbours that were solved by this journal, not read."""
 

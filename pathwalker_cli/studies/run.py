@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pathwalker_cli.config import StudyConfig, study_patient
-from pathwalker_cli.errors import DataError
+from pathwalker_cli.errors import InputError
 from pathwalker_cli.ocp.by_shooting import solve_by_shooting
 from pathwalker_cli.ocp.ipopt import ProgressReport
 from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
@@ -22,8 +22,24 @@ from pathwalker_cli.output.run_folder import (
     write_run,
 )
 from pathwalker_cli.output.run_metrics import RunInputs, run_inputs
+from pathwalker_cli.studies.verdict import Verdict, verdict_of
+from pathwalker_cli.studies.verdict_text import verdict_lines
 
-__all__ = ["RunLog", "is_done", "run_study"]
+__all__ = ["Outcome", "RunLog", "is_done", "run_study"]
+
+
+class Outcome(NamedTuple):
+    """How a study ended.
+
+    Args:
+        solution: How the solve ended.
+        metrics: The metrics as they were written.
+        verdict: How sure the springs are; None where there is nothing to judge.
+    """
+
+    solution: GaitSolution
+    metrics: dict[str, Any]
+    verdict: Verdict | None
 
 
 class RunLog:
@@ -51,8 +67,8 @@ class RunLog:
 
 def run_study(
     study: StudyConfig, folder: Path, warm_start: Path | None = None, log: RunLog | None = None
-) -> tuple[GaitSolution, dict[str, Any]]:
-    """Solve a study and write its run folder; return how it ended and the metrics.
+) -> Outcome:
+    """Solve a study, judge its springs, and write its run folder.
 
     Args:
         study: The study.
@@ -68,7 +84,10 @@ def run_study(
     earlier = None if warm_start is None else warm_start_run(warm_start, study)
     inputs = run_inputs(config_text(study), study_patient(study), warm_start)
     solution = _solve(study, earlier, log)
-    return solution, write_run(folder, solution, _log_lines(solution, inputs, log), inputs)
+    verdict = verdict_of(solution) if study.verdict else None
+    lines = [*_log_lines(solution, inputs, log), *_verdict_lines(verdict)]
+    more = {"verdict": None if verdict is None else verdict.as_dict()}
+    return Outcome(solution, write_run(folder, solution, lines, inputs, more), verdict)
 
 
 def is_done(folder: Path, study: StudyConfig) -> bool:
@@ -80,7 +99,7 @@ def is_done(folder: Path, study: StudyConfig) -> bool:
     try:
         run = load_run(folder, allow_unconverged=True)
         same = config_text(run.config) == config_text(study)
-    except DataError:
+    except InputError:
         return False
     now = run_inputs("", study_patient(study)).hashes.get("patient")
     then = run.metrics.get("input_hashes", {}).get("patient")
@@ -96,6 +115,10 @@ def _solve(study: StudyConfig, earlier: Run | None, log: RunLog) -> GaitSolution
     if study.starts > 1 and motion is None:
         return solve_from_starts(study, log.optimum)
     return GaitSolver(study, log).solve(motion)
+
+
+def _verdict_lines(verdict: Verdict | None) -> list[str]:
+    return [] if verdict is None else [f"{label}: {text}" for label, text in verdict_lines(verdict)]
 
 
 def _log_lines(solution: GaitSolution, inputs: RunInputs, log: RunLog) -> list[str]:

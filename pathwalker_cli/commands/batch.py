@@ -1,0 +1,116 @@
+"""The command `batch`: patients, problems and overrides in any number, on all cores."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from pathwalker_cli.studies.batch.worker import Pool
+
+__all__ = ["batch_command"]
+
+
+@click.command("batch")
+@click.argument("study", metavar="STUDY")
+@click.option(
+    "-o",
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder of runs and table; runs/ and the name of STUDY if left out. What is done there "
+    "already is kept.",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(1, 10000),
+    metavar="N",
+    help="Cases at a time, each on one core; all cores if left out. With slurm: jobs.",
+)
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Dask scheduler whose workers solve the cases, e.g. tcp://10.0.0.1:8786; or slurm.",
+)
+@click.option(
+    "--time-limit",
+    type=click.FloatRange(0.0, min_open=True),
+    metavar="SECONDS",
+    help="Give up a case that takes longer. On this machine only.",
+)
+@click.option(
+    "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Override a key of STUDY."
+)
+@click.option("--quiet", is_flag=True, help="Print errors only.")
+def batch_command(
+    study: str,
+    out: Path | None,
+    workers: int | None,
+    scheduler: str | None,
+    time_limit: float | None,
+    changes: tuple[str, ...],
+    quiet: bool,
+) -> None:
+    """Solve every case of STUDY: patients, problems and overrides in any number.
+
+    STUDY is a YAML file or the name of a shipped one. All cases are checked before the first is
+    solved. DIR/cases.csv has a row for every case, DIR/cases a run folder. A case that converged
+    with the same config is not solved again, so an interrupted call goes on where it was, and
+    patients may be added. Exit codes: 0 all converged, 1 some case did not, 2 bad input.
+    """
+    from pathwalker_cli.commands.batch_progress import BatchProgress
+    from pathwalker_cli.errors import NotConvergedError
+    from pathwalker_cli.studies.batch.cases import load_cases
+    from pathwalker_cli.studies.batch.study import run_batch
+    from pathwalker_cli.studies.batch.text import failure_sentence, report_text
+
+    batch = load_cases(study, changes)
+    folder = out or Path("runs") / batch.name
+    with _pool(workers, scheduler, time_limit) as pool, BatchProgress(quiet) as progress:
+        report = run_batch(batch.cases, folder, pool, progress)
+    if not quiet:
+        click.echo(report_text(report))
+    if report.failed:
+        raise NotConvergedError(failure_sentence(report))
+
+
+def _pool(
+    workers: int | None, scheduler: str | None, time_limit: float | None
+) -> AbstractContextManager[Pool]:
+    """Return whoever solves the cases.
+
+    Raises:
+        ConfigError: If the options do not fit together.
+    """
+    import os
+
+    if scheduler is None:
+        from pathwalker_cli.studies.batch.local import LocalPool
+
+        return nullcontext(LocalPool(workers or len(os.sched_getaffinity(0)), time_limit))
+    _check_options(workers, scheduler, time_limit)
+    from pathwalker_cli.studies.batch.cluster import connected, slurm_jobs
+
+    return connected(scheduler) if workers is None else slurm_jobs(workers)
+
+
+def _check_options(workers: int | None, scheduler: str, time_limit: float | None) -> None:
+    """Refuse options that do not go with a scheduler.
+
+    Raises:
+        ConfigError: If there are any.
+    """
+    from pathwalker_cli.errors import ConfigError
+
+    if time_limit is not None:
+        mend = "with --scheduler limit the solver, e.g. --set set.solver.ipopt.max_wall_time=600"
+        raise ConfigError("is kept on this machine only", where="--time-limit", mend=mend)
+    if scheduler == "slurm" and workers is None:
+        what = "says how many jobs slurm shall start"
+        raise ConfigError(what, where="--workers", mend="add --workers N")
+    if scheduler != "slurm" and workers is not None:
+        what = "does not change the workers of a scheduler that runs already"
+        raise ConfigError(what, where="--workers", mend="leave it out")

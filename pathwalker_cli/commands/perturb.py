@@ -1,0 +1,83 @@
+"""The command `perturb`: what softer or stiffer springs change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
+
+if TYPE_CHECKING:
+    from pathwalker_cli.output.run_folder import Run
+    from pathwalker_cli.studies.base import NeighbourStudy
+
+__all__ = ["base_with_springs", "perturb_command"]
+
+ENTRIES = frozenset({"base", "points", "figures", "perturbation.csv", "perturbation.json"})
+"""All that the command writes."""
+
+
+@click.command("perturb")
+@study_options("runs/perturbation")
+def perturb_command(
+    config: str, out: Path, run: Path | None, changes: tuple[str, ...], quiet: bool
+) -> None:
+    """Move every orthosis spring a little from its optimum and solve all the rest again.
+
+    CONFIG is a YAML file or the name of a shipped one (perturbation). Changes of cost, crouch,
+    steps and speed stand beside table 5 of the article where the two are about the same patient.
+    An interrupted call goes on where it was. Exit codes: 0 all converged, 1 some solve did not,
+    2 bad input.
+    """
+    from pathwalker_cli.errors import NotConvergedError
+    from pathwalker_cli.studies.base import check_folder, load_study
+    from pathwalker_cli.studies.perturbation import PerturbationStudy, perturb
+    from pathwalker_cli.studies.perturbation_figures import save_perturbation_figure
+    from pathwalker_cli.studies.perturbation_text import perturbation_lines, write_perturbation
+
+    study = load_study(config, PerturbationStudy, changes)
+    check_folder(out, ENTRIES, "perturb")
+    base = base_with_springs(study, run, out, quiet)
+    tell = teller(quiet)
+    result = perturb(
+        study,
+        base,
+        out,
+        lambda row: tell(
+            f"{row.label}: {row.status}, {row.iterations} iterations, {row.seconds:.1f} s"
+        ),
+    )
+    write_perturbation(result, out)
+    save_perturbation_figure(result, out / "figures")
+    if not quiet:
+        click.echo("\n".join(perturbation_lines(result)))
+        click.echo(f"\nWritten to {out}")
+    if result.failed:
+        failed = ", ".join(row.label for row in result.failed)
+        raise NotConvergedError(f"no solution was found for {failed}; {out} holds the others")
+
+
+def base_with_springs(study: NeighbourStudy, run: Path | None, out: Path, quiet: bool) -> Run:
+    """Return the run with springs that a study stands on, read or solved now.
+
+    Args:
+        study: The study.
+        run: Folder of a run to use; None to solve the base of the study.
+        out: Folder of the study, which takes the base.
+        quiet: Whether to show nothing.
+
+    Raises:
+        ConfigError: If there are no springs in it, or the study also overrides its values.
+        DataError: If the run cannot be used.
+        NotConvergedError: If the base did not converge.
+    """
+    from pathwalker_cli.studies.base import base_config
+    from pathwalker_cli.studies.springs import require_springs
+
+    if run is None:
+        require_springs(base_config(study), f"base {study.base}")
+    found = base_of(study, run, out, quiet)
+    require_springs(found.config, f"--run {run}")
+    return found

@@ -1,0 +1,42 @@
+"""The command `sensitivity`: what every number of patient and orthosis does to the answer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from pathwalker_cli.commands.neighbour_study import base_of, study_options
+
+__all__ = ["sensitivity_command"]
+
+
+@click.command("sensitivity")
+@study_options("runs/sensitivity")
+def sensitivity_command(
+    config: str, out: Path, run: Path | None, changes: tuple[str, ...], quiet: bool
+) -> None:
+    """Tell what one percent of every number would change, without solving again.
+
+    CONFIG is a YAML file or the name of a shipped one (sensitivity). Springs, orthosis, strengths,
+    mass and lengths are asked about, one by one; the derivatives of cost and of every gait metric
+    come from the optimality conditions. Exit codes: 0 done, 1 the base did not converge, 2 bad
+    input.
+    """
+    from pathwalker_cli.studies.base import check_folder, load_study
+    from pathwalker_cli.studies.sensitivity import SensitivityStudy, sensitivities
+    from pathwalker_cli.studies.sensitivity_figures import save_sensitivity_figure
+    from pathwalker_cli.studies.sensitivity_text import (
+        FILES,
+        sensitivity_lines,
+        write_sensitivities,
+    )
+
+    study = load_study(config, SensitivityStudy, changes)
+    check_folder(out, frozenset({"base", "points", "figures", *FILES}), "sensitivity")
+    result = sensitivities(study, base_of(study, run, out, quiet), out)
+    write_sensitivities(result, out)
+    save_sensitivity_figure(result, out / "figures")
+    if not quiet:
+        click.echo("\n".join(sensitivity_lines(result)))
+        click.echo(f"\nWritten to {out}")

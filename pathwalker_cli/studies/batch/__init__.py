@@ -1,0 +1,1 @@
+"""Any list or grid of patients, problems and overrides, on all cores or on a cluster."""

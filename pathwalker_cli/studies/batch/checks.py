@@ -1,0 +1,103 @@
+"""What can be known of a case without solving it: whether patient, problem and overrides fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.errors import ConfigError, InputError, PatientError
+from pathwalker_cli.model.walker import Walker, build_walker
+from pathwalker_cli.ocp.gait_bounds import gait_bounds
+from pathwalker_cli.ocp.passage import recorded_passage
+from pathwalker_cli.ocp.start import recorded_stride, start_recording
+from pathwalker_cli.ocp.symmetry import asymmetries
+from pathwalker_cli.output.run_folder import warm_start_run
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.variation import varied
+
+__all__ = ["check_case", "check_warm_start"]
+
+
+def check_case(name: str, config: StudyConfig, patient: Patient, where: str) -> None:
+    """Refuse a case that could not even begin.
+
+    Args:
+        name: Its name, for the message.
+        config: Its config.
+        patient: Its patient, as in the file.
+        where: The study, for the message.
+
+    Raises:
+        InputError: If the patient lacks what the problem needs, or a value does not fit.
+    """
+    with _named(f"{where}, case {name}"):
+        _check_needs(config, patient)
+        model = config.model
+        changed = varied(patient, config.variation)
+        walker = build_walker(changed, config.condition, model.published, model.backend)
+        gait_bounds(walker, config.bounds)
+        _check_start(config, walker)
+
+
+def _check_needs(config: StudyConfig, patient: Patient) -> None:
+    """Refuse a patient without what the problem needs, and a config for several processes.
+
+    Raises:
+        InputError: If so.
+    """
+    if config.condition == "orthosis" and patient.orthosis is None:
+        raise PatientError(
+            f"patient {patient.id} has no orthosis, which problem {config.problem} needs",
+            where=str(patient.source),
+            mend="add the orthosis to the file, or list patient and problem in another study",
+        )
+    if config.starts > 1:
+        raise ConfigError(
+            f"is {config.starts}",
+            where="starts",
+            allowed="1, as the cores belong to the cases",
+            mend="spread the starts as cases, e.g. grid: {start.knee_flexion: [0.5, 0.7, 0.9]}",
+        )
+    _ = patient.max_isometric_torque
+
+
+def _check_start(config: StudyConfig, walker: Walker) -> None:
+    """Refuse half a cycle of unequal sides, and a recorded start without a recording.
+
+    Raises:
+        InputError: If so.
+    """
+    differing = asymmetries(walker) if config.half_cycle else []
+    if differing:
+        raise ConfigError(
+            f"asks for half a cycle, but {', '.join(differing)} differ between the sides of "
+            f"{walker.patient.id}",
+            where="half_cycle",
+            mend="set half_cycle to false",
+        )
+    if config.start.gait == "recorded":
+        recording = start_recording(walker, config.start)
+        (recorded_passage if config.fits else recorded_stride)(walker, recording)
+
+
+def check_warm_start(folder: Path, config: StudyConfig, where: str) -> None:
+    """Refuse an earlier run that the cases of a problem cannot begin with.
+
+    Raises:
+        InputError: If it is missing, damaged, not converged or about something else.
+    """
+    with _named(where):
+        warm_start_run(folder, config)
+
+
+@contextmanager
+def _named(where: str) -> Iterator[None]:
+    """Put the place of a case before the place of an error."""
+    try:
+        yield
+    except InputError as error:
+        inner = error.where.removeprefix("--warm-start").strip()
+        place = f"{where}: {inner}" if inner else where
+        raise type(error)(error.what, where=place, allowed=error.allowed, mend=error.mend) from None

@@ -1,0 +1,119 @@
+"""The file of a study of many cases: what it may hold, and how it is read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pydantic import Field, field_validator, model_validator
+
+from pathwalker_cli.config import StudyConfig, apply_change, find_config
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.io.fields import YamlModel, invalid
+from pathwalker_cli.io.yaml_file import read_mapping, read_value, validate
+
+__all__ = ["BatchStudy", "NamedCase", "flat", "load_batch"]
+
+_DOTTED: Final = ("set", "grid", "warm_start")
+"""Keys whose own keys may hold dots."""
+
+_LISTED: Final = {"problem": "problems", "patient": "patients"}
+"""Keys of a config that every case brings along, and where they are listed."""
+
+
+class NamedCase(YamlModel):
+    """Overrides that belong together, under a name."""
+
+    name: str
+    set: dict[str, Any] = Field(default_factory=dict)
+
+    @field_validator("name")
+    @classmethod
+    def _safe(cls, value: str) -> str:
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}", value):
+            raise invalid(
+                f"is {value!r}, which is not safe in the name of a folder",
+                allowed="letters, digits, - _ and ., at most 40, a letter or digit first",
+            )
+        return value
+
+
+class BatchStudy(YamlModel):
+    """Many cases: every patient in every problem with every override."""
+
+    patients: Annotated[tuple[str, ...], Field(min_length=1)]
+    problems: Annotated[tuple[str, ...], Field(min_length=1)]
+    set: dict[str, Any] = Field(default_factory=dict)
+    grid: dict[str, Annotated[list[Any], Field(min_length=1)]] = Field(default_factory=dict)
+    cases: tuple[NamedCase, ...] = ()
+    warm_start: dict[str, str] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _each_key_once(self) -> BatchStudy:
+        everywhere, fixed = list(flat(self.set)), [key for c in self.cases for key in flat(c.set)]
+        for key in (*everywhere, *self.grid, *fixed):
+            if key in _LISTED:
+                raise invalid(
+                    f"overrides {key}, which every case has of its own",
+                    mend=f"list it under {_LISTED[key]}",
+                )
+            if key in self.grid and key in (*everywhere, *fixed):
+                place = "set" if key in everywhere else "cases"
+                what = f"varies {key} in grid and sets it in {place}"
+                raise invalid(what, mend="leave one of them out")
+        names = [case.name for case in self.cases]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise invalid(f"has two cases named {twice}", mend="rename one of them")
+        return self
+
+
+def flat(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return overrides with blocks such as {mesh: {degree: 4}} written as "mesh.degree"."""
+    result: dict[str, Any] = {}
+    for key, value in values.items():
+        if key in StudyConfig.model_fields and isinstance(value, Mapping):
+            result |= {f"{key}.{inner}": entry for inner, entry in value.items()}
+        else:
+            result[key] = value
+    return result
+
+
+def load_batch(path: str | Path, changes: tuple[str, ...] = ()) -> tuple[BatchStudy, Path]:
+    """Read a study of many cases; return it and the file that it stands in.
+
+    Args:
+        path: The YAML file, or the name of a shipped one.
+        changes: Overrides "key=value" of the study's own keys, as from the command line.
+
+    Raises:
+        ConfigError: If file or overrides are wrong.
+    """
+    source = find_config(Path(path))
+    mapping, lines = read_mapping(source, ConfigError)
+    for change in changes:
+        _apply(mapping, change)
+    study = validate(mapping, BatchStudy, where=str(path), error=ConfigError, lines=lines)
+    return study, source.resolve()
+
+
+def _apply(mapping: dict[str, Any], change: str) -> None:
+    """Put one override into the content of the file."""
+    key, equals, text = change.partition("=")
+    head, dot, rest = key.strip().partition(".")
+    if equals and head in StudyConfig.model_fields and head not in BatchStudy.model_fields:
+        raise ConfigError(
+            f"'{head}' is no key of a study of many cases",
+            where=f"--set {change}",
+            allowed=", ".join(BatchStudy.model_fields),
+            mend=f"for a value of every case: --set set.{change}",
+        )
+    if not (equals and dot and head in _DOTTED):
+        apply_change(mapping, change)
+        return
+    holder = mapping.setdefault(head, {})
+    if not isinstance(holder, dict):
+        raise ConfigError(f"'{head}' holds no keys", where=f"--set {key}")
+    holder[rest] = read_value(text, f"--set {key}")

@@ -1,0 +1,105 @@
+"""The table of a study, one row per case: the same bytes whoever solved the cases."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.io.atomic import atomic_open
+from pathwalker_cli.output.tables import DIGITS
+from pathwalker_cli.studies.batch.cases import Case
+from pathwalker_cli.studies.batch.units import unit_of
+
+__all__ = ["CONVERGED", "PENDING", "CaseTable", "read_metrics", "write_rows"]
+
+CONVERGED: Final = "converged"
+PENDING: Final = "not yet run"
+"""Status of a case whose turn has not come."""
+
+_PER_SIDE: Final = {
+    "step_length": "m",
+    "min_stance_knee_flexion": "rad",
+    "dorsiflexion_stiffness": "N m/rad",
+    "plantarflexion_stiffness": "N m/rad",
+}
+
+_GAIT: Final = {
+    "cost": "",
+    "walking_speed": "m/s",
+    **{f"{stem}_{side}": unit for stem, unit in _PER_SIDE.items() for side in SIDES},
+    "effort_per_distance": "s/m",
+}
+"""Metrics of a converged case and their units: a last iterate is no gait."""
+
+_PROOF: Final = {
+    "largest_violation": "",
+    "reintegration_position_error": "rad or m",
+    "reintegration_velocity_error": "rad/s or m/s",
+    "intervals": "",
+    "iterations": "",
+}
+"""Metrics of every case that was solved, converged or not."""
+
+
+class CaseTable:
+    """Headers and rows of the cases of one study.
+
+    Args:
+        cases: All cases in order.
+    """
+
+    def __init__(self, cases: Sequence[Case]) -> None:
+        self._named = any(case.variant for case in cases)
+        varied = {key: unit_of(key) for case in cases[:1] for key in case.values}
+        columns = {"case": "", "patient": "", "problem": "", **varied}
+        columns |= {"variant": ""} if self._named else {}
+        columns |= {"status": "", **_GAIT, **_PROOF}
+        self.header = [f"{name} [{unit}]" if unit else name for name, unit in columns.items()]
+
+    def row(
+        self, case: Case, status: str, metrics: Mapping[str, Any] | None = None
+    ) -> tuple[str, ...]:
+        """Return the row of a case.
+
+        Args:
+            case: The case.
+            status: "converged", or why not.
+            metrics: Content of the run's `metrics.json`; None if there is no run.
+        """
+        row = [case.name, case.patient, case.problem, *map(_varied, case.values.values())]
+        row += [case.variant] if self._named else []
+        found = metrics or {}
+        gait = found if status == CONVERGED else {}
+        numbers = [gait.get(name) for name in _GAIT] + [found.get(name) for name in _PROOF]
+        return (*row, status, *map(_number, numbers))
+
+
+def read_metrics(folder: Path) -> dict[str, Any] | None:
+    """Return the metrics in a run folder; None if they are not there."""
+    try:
+        content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return content if isinstance(content, dict) and "status" in content else None
+
+
+def write_rows(path: Path, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Write a table in one stroke."""
+    with atomic_open(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(head)
+        writer.writerows(rows)
+
+
+def _varied(value: Any) -> str:
+    """Return a varied value as it stands in the table."""
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def _number(value: Any) -> str:
+    """Return a number as text, "" where there is none."""
+    return f"{value:.{DIGITS}g}" if isinstance(value, int | float) else ""

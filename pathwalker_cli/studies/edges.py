@@ -1,0 +1,129 @@
+"""How far one stiffness may move before the cost has risen by a given share, by solving again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from pathwalker_cli.ocp.resolve import Optimum
+
+__all__ = ["Edge", "find_edge"]
+
+_SOLVES: Final = 8
+"""Most solves spent on one edge."""
+
+_NEAR: Final = 0.1
+"""Share of the allowed rise by which the cost at an edge may miss it."""
+
+_STRETCH: Final = 1.3
+"""Multiple of a step up to which the limit of the range is tried at once."""
+
+Solve = Callable[[float, Optimum, bool], Optimum]
+"""Solves with the stiffness [N m/rad] prescribed, from a neighbour; whether to insist."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Where the cost has risen as far as allowed.
+
+    Args:
+        stiffness: The stiffness [N m/rad].
+        limit: Whether it is the limit of the range, with less than the allowed rise there.
+        rise: Rise of the cost there, as a share.
+        certain: Whether solves enclose it; otherwise it is the last one that was solved.
+        again: Whether the cost is good again at the limit of the range: another local optimum.
+        solves: Number of solves.
+        iterations: Their iterations.
+    """
+
+    stiffness: float
+    limit: bool
+    rise: float
+    certain: bool
+    solves: int
+    iterations: int
+    again: bool = False
+
+
+@dataclass
+class _Search:
+    """A search in one direction: the last point inside, and the first one outside if known."""
+
+    inside: Optimum
+    at: float
+    rise: float = 0.0
+    outside: float | None = None
+    outside_rise: float = 0.0
+    solves: int = 0
+    iterations: int = 0
+
+
+def find_edge(
+    solve: Solve,
+    optimum: Optimum,
+    start: float,
+    limit: float,
+    share: float,
+    step: float,
+    look: bool = True,
+) -> Edge:
+    """Return where the cost has risen by a share, or the limit of the range.
+
+    Args:
+        solve: Solves with the stiffness prescribed; the others follow.
+        optimum: The optimum.
+        start: Its stiffness [N m/rad].
+        limit: The end of the range in the direction of the search [N m/rad].
+        share: Allowed rise of the cost relative to its size, e.g. 0.05.
+        step: Expected distance to the edge [N m/rad], positive.
+        look: Whether to look at the limit for another optimum, where the edge lies before it.
+    """
+    search = _Search(optimum, start)
+    sign, size = (1.0 if limit > start else -1.0), abs(optimum.cost)
+    while search.solves < _SOLVES and search.at != limit:
+        if search.outside is None:
+            trial = search.at + sign * step
+            if abs(limit - search.at) <= _STRETCH * step:
+                trial = limit
+        else:
+            trial = _between(search, share)
+        found = solve(trial, search.inside, True)
+        search.solves += 1
+        search.iterations += found.result.iterations
+        if not found.converged:
+            step = abs(trial - search.at) / 2.0
+            search.outside = None
+            continue
+        rise = (found.cost - optimum.cost) / size
+        if rise <= share * (1.0 + _NEAR):
+            search.inside, search.at, search.rise = found, trial, rise
+            step = max(step, 2.0 * abs(trial - start))
+        else:
+            search.outside, search.outside_rise = trial, rise
+        if abs(rise - share) <= _NEAR * share and trial != limit:
+            edge = Edge(trial, False, rise, True, search.solves, search.iterations)
+            return (
+                _looked_beyond(edge, solve, optimum, search.inside, limit, share) if look else edge
+            )
+    limited = search.at == limit
+    return Edge(search.at, limited, search.rise, limited, search.solves, search.iterations)
+
+
+def _looked_beyond(
+    edge: Edge, solve: Solve, optimum: Optimum, inside: Optimum, limit: float, share: float
+) -> Edge:
+    """Return an edge inside the range, after one look at the limit."""
+    found = solve(limit, inside, False)
+    again = found.converged and found.cost - optimum.cost <= share * abs(optimum.cost)
+    iterations = edge.iterations + found.result.iterations
+    return replace(edge, again=again, solves=edge.solves + 1, iterations=iterations)
+
+
+def _between(search: _Search, share: float) -> float:
+    """Return where the cost should meet the share, between the points inside and outside."""
+    assert search.outside is not None
+    part = (share - search.rise) / (search.outside_rise - search.rise)
+    # the cost is convex near its optimum: the true edge lies beyond the secant's
+    part = min(max(part**0.5 if search.rise <= 0.0 else part, 0.1), 0.9)
+    return search.at + part * (search.outside - search.at)

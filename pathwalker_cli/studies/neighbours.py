@@ -1,0 +1,85 @@
+"""All that a study of many neighbours solves: through a journal, one line told for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.ocp.resolve import Optimum
+from pathwalker_cli.output.run_folder import Run
+from pathwalker_cli.studies.base import resolver_of
+from pathwalker_cli.studies.graph import Solve, Values
+from pathwalker_cli.studies.journal import Journal
+
+__all__ = ["Neighbours", "motion_distance", "motion_signature"]
+
+
+class Neighbours:
+    """Solves neighbours of a run and keeps them in a folder.
+
+    Args:
+        run: The run.
+        folder: Where they are kept.
+        max_iterations: Largest number of iterations of one solve.
+        tell: Is told of every neighbour.
+
+    Raises:
+        DataError: If the run is by another transcription, so that nothing warm can begin there.
+        NotConvergedError: If the run itself cannot be solved again.
+    """
+
+    def __init__(
+        self, run: Run, folder: Path, max_iterations: int, tell: Callable[[str], None]
+    ) -> None:
+        if run.config.transcription != "collocation":
+            raise DataError(f"was solved by {run.config.transcription}", where=str(run.folder),
+                            allowed="a run by collocation")  # fmt: skip
+        self.run = run
+        self._tell = tell
+        limited = with_values(run.config, {"solver.max_iterations": max_iterations})
+        resolver = resolver_of(Run(run.folder, run.metrics, run.motion, limited, run.multipliers))
+        self._journal = Journal(folder, run, resolver)
+        self.optimum: Optimum = resolver.optimum
+        """The run as an optimum, solved to its tolerance."""
+        if not self.optimum.converged:
+            raise NotConvergedError(
+                f"the run in {run.folder} could not be solved again: {self.optimum.result.status}"
+            )
+        self._count = 0
+
+    def resolve(self, name: str, config: StudyConfig, start: Optimum | None) -> Optimum:
+        """Return a neighbour, read or solved now; see `Journal.resolve`."""
+        solved = self._journal.solved
+        found = self._journal.resolve(name, config, start)
+        self._count += 1
+        result = found.result
+        how = f"{result.iterations} iterations, {result.seconds:.1f} s"
+        how = how if self._journal.solved > solved else f"{how}, kept from before"
+        outcome = f"cost {found.cost:.5g}" if found.converged else result.status
+        self._tell(f"{self._count:4d}  {name:<24} {outcome}, {how}")
+        return found
+
+    def solver(self, config_at: Callable[[Values], StudyConfig]) -> Solve[Optimum]:
+        """Return what solves the points of a graph.
+
+        Args:
+            config_at: Returns the config of the values of a point.
+        """
+        return lambda name, values, start: self.resolve(name, config_at(values), start)
+
+
+def motion_distance(one: Optimum, other: Optimum) -> float:
+    """Return the root mean square difference of the scaled unknowns of two neighbours."""
+    difference = one.result.unknowns - other.result.unknowns
+    return float(np.sqrt(np.mean(difference**2)))
+
+
+def motion_signature(optimum: Optimum) -> np.ndarray:
+    """Return speed [m/s] and stiffnesses [N m/rad] of a solution, by which optima differ."""
+    motion = optimum.motion
+    distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
+    return np.array([distance / motion.duration, *motion.parameters])

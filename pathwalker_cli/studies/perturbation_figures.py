@@ -1,0 +1,104 @@
+"""The figure of a perturbation: how each number answers each spring, beside the article's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import matplotlib as mpl
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pathwalker_cli.output.cycle import BOTH_SIDES
+from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.style import (
+    LINE_COLOUR,
+    NEUTRAL,
+    PAGE,
+    SMALL,
+    STYLE,
+    dress,
+    legend,
+    new_figure,
+)
+from pathwalker_cli.studies.measures import COMPARED, measure_of
+from pathwalker_cli.studies.perturbation_result import Perturbation, Perturbed
+from pathwalker_cli.studies.perturbation_text import paper_changes
+
+__all__ = ["perturbation_figure", "save_perturbation_figure"]
+
+_MARKER: Final = {"right": "o", "left": "s"}
+"""Sides differ without colour too."""
+
+_LEAST_SPAN: Final = 0.02
+"""Least width of an axis [%]: smaller changes are none."""
+
+
+def save_perturbation_figure(result: Perturbation, folder: Path) -> None:
+    """Save the figure as PNG and SVG."""
+    folder.mkdir(parents=True, exist_ok=True)
+    figure = perturbation_figure(result)
+    for extension in ("png", "svg"):
+        save_figure(figure, folder / f"perturbation.{extension}")
+
+
+def perturbation_figure(result: Perturbation) -> Figure:
+    """Return one panel per measure with the change [%] for every spring that was moved."""
+    with mpl.rc_context(STYLE):
+        fig = new_figure(PAGE, 1.6 + 0.55 * len(result.rows))
+        panels = fig.subplots(2, 3, sharey=True)
+        for i, (ax, key) in enumerate(zip(panels.flat, COMPARED, strict=True)):
+            _draw(ax, result, key)
+            dress(ax, measure_of(key).label, "change [%]" if i >= 3 else "")
+            ax.grid(visible=False, axis="y")
+        ax = panels[0, 0]
+        ax.set_yticks(range(len(result.rows)), [_label(result, row) for row in result.rows])
+        ax.set_ylim(len(result.rows) - 0.5, -0.5)
+        legend(fig, _handles(result))
+        return fig
+
+
+def _label(result: Perturbation, row: Perturbed) -> str:
+    """Return the name of a spring with both its stiffnesses."""
+    symbol, side = measure_of(row.spring).label.split()
+    name = f"${symbol[0]}_{symbol[-1]}$ {side}, {100.0 * (row.factor - 1.0):+.3g} %"
+    return f"{name}\n{result.base[row.spring]:.3g} to {row.stiffness:.3g} N m/rad"
+
+
+def _draw(ax: Axes, result: Perturbation, key: str) -> None:
+    """Draw the changes of one measure, from zero to each mark."""
+    ax.axvline(0.0, color=NEUTRAL, linewidth=0.6)
+    shown = [0.0]
+    for y, row in enumerate(result.rows):
+        side = next(side for side in BOTH_SIDES if row.spring.endswith(side))
+        if key in row.changes:
+            x = 100.0 * row.changes[key]
+            ax.plot([0.0, x], [y, y], color=LINE_COLOUR[side], linewidth=1.4, solid_capstyle="butt")
+            ax.plot(x, y, _MARKER[side], color=LINE_COLOUR[side], markersize=4.5)
+            shown.append(x)
+        paper = paper_changes(result, row)
+        if key in paper:
+            x = 100.0 * paper[key]
+            ax.plot(x, y, "D", markersize=4.5, mfc="none", mec="black", mew=0.8)
+            shown.append(x)
+    room = max(max(shown) - min(shown), _LEAST_SPAN)
+    ax.set_xlim(min(shown) - 0.1 * room, max(shown) + 0.1 * room)
+    ax.locator_params(axis="x", nbins=5)
+    ax.tick_params(labelsize=SMALL)
+
+
+def _handles(result: Perturbation) -> list[Artist]:
+    """Return the entries of the legend."""
+    handles: list[Artist] = [
+        Line2D([], [], color=LINE_COLOUR[side], marker=_MARKER[side], markersize=4.5,
+               label=f"{side} spring moved")
+        for side in reversed(BOTH_SIDES)
+    ]  # fmt: skip
+    if any(paper_changes(result, row) for row in result.rows):
+        handles.append(
+            Line2D([], [], color="black", marker="D", markersize=4.5, mfc="none", linewidth=0,
+                   label="article, table 5 (another optimum)")
+        )  # fmt: skip
+    return handles

@@ -1,0 +1,188 @@
+"""Neighbours of one run on many processes: each process builds its solver once and keeps it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import Final
+
+from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.output.run_folder import load_run
+from pathwalker_cli.studies.base import resolver_of
+from pathwalker_cli.studies.journal import Journal
+from pathwalker_cli.studies.measures import measures
+
+__all__ = ["Job", "Solved", "for_far_neighbours", "solve_jobs"]
+
+_PUSHED: Final = (
+    "bound_push",
+    "bound_frac",
+    "slack_bound_push",
+    "slack_bound_frac",
+    "mult_bound_push",
+)
+
+_PUSH: Final = 1e-2
+"""How far a start is moved off bounds, in solver units: neighbours further off change which bounds
+are active, and from nearer the bounds steps are cut to a few per cent for dozens of iterations."""
+
+_FAR: Final[dict[str, float | int | str]] = {
+    **{f"warm_start_{key}": _PUSH for key in _PUSHED},
+    # full steps are tried for longer before the filter cuts them
+    "watchdog_shortened_iter_trigger": 1,
+    "watchdog_trial_iter_max": 30,
+}
+"""Options of IPOPT for neighbours that differ in many numbers at once: a quarter fewer iterations
+than without."""
+
+STOPPED: Final = "stopped by the user; the same command goes on from there"
+
+
+@dataclass(frozen=True)
+class Job:
+    """A neighbour to solve.
+
+    Args:
+        name: Its name in the journal.
+        config: Its config.
+    """
+
+    name: str
+    config: StudyConfig
+
+
+@dataclass(frozen=True)
+class Solved:
+    """Where the solve of a neighbour ended.
+
+    Args:
+        name: Its name in the journal.
+        status: "converged" or the reason why not.
+        values: Its measures, SI units; empty if it did not converge.
+        iterations: Iterations of the last attempt.
+        seconds: Wall seconds of the last attempt.
+        kept: Whether it was read and not solved now.
+    """
+
+    name: str
+    status: str
+    values: Mapping[str, float]
+    iterations: int
+    seconds: float
+    kept: bool
+
+
+def for_far_neighbours(config: StudyConfig) -> StudyConfig:
+    """Return a config whose solver is ready to go far; its own IPOPT options win."""
+    return with_values(config, {"solver.ipopt": {**_FAR, **config.solver.ipopt}})
+
+
+def solve_jobs(
+    jobs: Sequence[Job],
+    run: Path,
+    folder: Path,
+    tolerance: float,
+    workers: int,
+    told: Callable[[Solved], None] | None = None,
+) -> Iterator[Solved]:
+    """Yield solved neighbours as they come; every one starts from the run itself.
+
+    So it does not matter how many processes there are, and which one solves what.
+
+    Args:
+        jobs: What to solve.
+        run: Folder of the run.
+        folder: Folder of the journal.
+        tolerance: Optimality tolerance.
+        workers: Processes; with one, this process does it.
+        told: Is told of every one.
+
+    Raises:
+        NotConvergedError: If the user stopped it, or a process was ended from outside.
+    """
+    source = _solved_here if min(workers, len(jobs)) == 1 else _solved_elsewhere
+    for solved in source(jobs, (run, folder, tolerance), workers):
+        if told is not None:
+            told(solved)
+        yield solved
+
+
+_Origin = tuple[Path, Path, float]
+"""Folders of run and journal, and the tolerance."""
+
+
+def _journal(origin: _Origin) -> Journal:
+    run = load_run(origin[0])
+    run = replace(run, config=for_far_neighbours(run.config))
+    return Journal(origin[1], run, resolver_of(run, origin[2]))
+
+
+def _solved(journal: Journal, job: Job) -> Solved:
+    """Solve one neighbour."""
+    before = journal.solved
+    optimum = journal.resolve(job.name, job.config)
+    values = measures(optimum) if optimum.converged else {}
+    result = optimum.result
+    kept = journal.solved == before
+    return Solved(job.name, result.status, values, result.iterations, result.seconds, kept)
+
+
+def _solved_here(jobs: Sequence[Job], origin: _Origin, workers: int) -> Iterator[Solved]:
+    journal = _journal(origin)
+    for job in jobs:
+        yield _solved(journal, job)
+
+
+def _solved_elsewhere(jobs: Sequence[Job], origin: _Origin, workers: int) -> Iterator[Solved]:
+    """Yield what other processes solve."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(
+        min(workers, len(jobs)), mp_context=context, initializer=_begin, initargs=(origin,)
+    ) as pool:
+        futures = [pool.submit(_in_worker, job) for job in jobs]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        except BrokenProcessPool:
+            raise NotConvergedError(
+                "a process was ended from outside (out of memory?); the same command goes on from "
+                "there, with fewer --workers if need be"
+            ) from None
+        except BaseException as end:
+            pool.shutdown(wait=False, cancel_futures=True)
+            if isinstance(end, KeyboardInterrupt):
+                raise NotConvergedError(STOPPED) from None
+            raise
+
+
+_KEPT: Final[list[Journal]] = []
+"""The journal of a worker process, built once."""
+
+
+def _begin(origin: _Origin) -> None:
+    """Get a worker process ready."""
+    # Ctrl-C reaches workers too: the solver stops by itself, and between solves the parent decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        # a killed parent cannot tell its workers: they would wait for work forever
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+    _KEPT[:] = [_journal(origin)]
+
+
+def _end_with(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)
+
+
+def _in_worker(job: Job) -> Solved:
+    return _solved(_KEPT[0], job)

@@ -1,0 +1,245 @@
+"""What every number of patient and orthosis does to the optimum, from its KKT system.
+
+No problem is solved again, except where a check by finite differences is asked for.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.conventions import SIDES, STIFFNESSES
+from pathwalker_cli.errors import ConfigError, NotConvergedError
+from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.ocp.neighbourhood import Derivative, Neighbourhood
+from pathwalker_cli.ocp.resolve import Optimum
+from pathwalker_cli.output.run_folder import Run
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient_blocks import SegmentLengths, Strengths
+from pathwalker_cli.studies.base import NeighbourStudy, resolver_of
+from pathwalker_cli.studies.journal import Journal
+from pathwalker_cli.studies.measures import all_measures, measures
+
+__all__ = [
+    "Check",
+    "Sensitivities",
+    "Sensitivity",
+    "SensitivityStudy",
+    "default_places",
+    "sensitivities",
+]
+
+POINTS: Final = "points"
+"""Folder of the re-solves of a check."""
+
+_ORTHOSIS: Final = ("neutral_angle", "free_play", "preload_torque")
+
+_ORTHOSIS_PAIRS: Final = {
+    "dorsiflexion_stop": SIDES,
+    "plantarflexion_stop": SIDES,
+    "stop_stiffness": ("dorsiflexion", "plantarflexion"),
+}
+
+Step = Annotated[float, Quantity("", 1e-5, 0.2, above="is it in percent?")]
+
+
+class SensitivityStudy(NeighbourStudy):
+    """Which numbers are asked about, and which answers are checked by solving again."""
+
+    places: tuple[str, ...] = ()
+    tolerance: Annotated[float, Quantity("", 1e-12, 1e-6)] = 1e-9
+    check: tuple[str, ...] = ()
+    check_step: Step = 5e-4
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """The answer to one number.
+
+    Args:
+        place: A spring, or a place in the patient's file.
+        value: The number now in SI units; None where several numbers change by one factor.
+        derivatives: Derivative of every measure by the relative change of the number, so that
+            0.01 of it is what one percent does; SI units.
+        elasticities: The same relative to the measure: percent per percent; None where the
+            measure is 0.
+    """
+
+    place: str
+    value: float | None
+    derivatives: Mapping[str, float]
+    elasticities: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One answer beside a finite difference of two solves.
+
+    Args:
+        place: What was changed.
+        step: Relative change up and down.
+        derivatives: Central differences of the measures by the relative change.
+        iterations: Iterations of both solves together.
+        seconds: Seconds of both solves.
+        changed: Inequalities that are active in one of the solves and not in the optimum.
+    """
+
+    place: str
+    step: float
+    derivatives: Mapping[str, float]
+    iterations: int
+    seconds: float
+    changed: int
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """All answers.
+
+    Args:
+        config: The problem.
+        patient: Id of the patient.
+        base: Measures of the optimum; SI units.
+        rows: The answers.
+        checks: Those that were checked.
+        active: Number of active inequalities at the optimum.
+        doubtful: Number of those that are neither clearly active nor clearly inactive.
+        seconds: Wall seconds of the answers, without solving the optimum and without checks.
+    """
+
+    config: StudyConfig
+    patient: str
+    base: Mapping[str, float]
+    rows: tuple[Sensitivity, ...]
+    checks: tuple[Check, ...]
+    active: int
+    doubtful: int
+    seconds: float
+
+    def row(self, place: str) -> Sensitivity:
+        """Return the answer to one number."""
+        return next(row for row in self.rows if row.place == place)
+
+
+def default_places(patient: Patient, worn: bool) -> tuple[str, ...]:
+    """Return the places in a patient's file that are asked about.
+
+    Args:
+        patient: The patient.
+        worn: Whether the orthosis is worn.
+    """
+    places = [f"orthosis.{name}" for name in _ORTHOSIS] if worn else []
+    places += [
+        f"orthosis.{name}.{end}" for name, two in _ORTHOSIS_PAIRS.items() if worn for end in two
+    ]
+    places += ["strengths"]
+    for name in Strengths.model_fields:
+        sides = ("",) if name.startswith("lumbar") else (".right", ".left")
+        places += [f"strengths.{name}{side}" for side in sides]
+    return (*places, "body_mass", *(f"segment_lengths.{n}" for n in SegmentLengths.model_fields))
+
+
+def sensitivities(asked: SensitivityStudy, run: Run, folder: Path) -> Sensitivities:
+    """Return the sensitivities of an optimum.
+
+    Args:
+        asked: What is asked.
+        run: The converged run.
+        folder: The study's folder; re-solves of checks are kept there.
+
+    Raises:
+        ConfigError: If a place does not exist, or a check is asked for what is not.
+        NotConvergedError: If the optimum cannot be solved to the tolerance.
+    """
+    config = with_values(run.config, {"solver.tolerance": asked.tolerance})
+    resolver = resolver_of(run, asked.tolerance)
+    around = Neighbourhood(resolver)
+    if not around.optimum.converged:
+        raise NotConvergedError(
+            f"the optimum in {run.folder} could not be solved to a tolerance of "
+            f"{asked.tolerance:g}: {around.optimum.result.status}"
+        )
+    began = time.perf_counter()
+    patient = around.optimum.solver.walker.patient
+    worn = config.condition == "orthosis"
+    places = (*around.springs, *(asked.places or default_places(patient, worn)))
+    unknown = [place for place in asked.check if place not in places]
+    if unknown:
+        raise ConfigError(f"names {unknown[0]}", where="check", allowed=", ".join(places))
+    base = all_measures(around.optimum)
+    rows = tuple(_sensitivity(around, place, base) for place in places)
+    seconds = time.perf_counter() - began
+    journal = Journal(folder / POINTS, run, resolver)
+    checks = tuple(
+        _check(around, journal, config, place, asked.check_step) for place in asked.check
+    )
+    kkt = around.kkt
+    return Sensitivities(config, patient.id, base, rows, checks, kkt.active, kkt.doubtful, seconds)
+
+
+def _sensitivity(around: Neighbourhood, place: str, base: Mapping[str, float]) -> Sensitivity:
+    """Return the answer to one number."""
+    value = _value(around.optimum, place)
+    if place in STIFFNESSES:
+        assert value is not None
+        found, unit = around.by_spring(place), value
+    else:
+        found, unit = around.by_factor(place), 1.0
+    derivatives = {key: unit * slope for key, slope in _slopes(found).items()}
+    elasticities = {key: slope / base[key] if base[key] else None
+                    for key, slope in derivatives.items()}  # fmt: skip
+    return Sensitivity(place, value, derivatives, elasticities)
+
+
+def _slopes(found: Derivative) -> dict[str, float]:
+    """Return the derivatives of all measures."""
+    below, above = all_measures(found.below), all_measures(found.above)
+    slopes = {key: (above[key] - below[key]) / (2.0 * found.step) for key in above if key in below}
+    return {**slopes, "cost": found.cost}
+
+
+def _value(optimum: Optimum, place: str) -> float | None:
+    """Return the number at a place, None where there are several."""
+    if place in STIFFNESSES:
+        return float(optimum.stiffness[STIFFNESSES.index(place)])
+    value: Any = optimum.solver.walker.patient
+    for part in place.split("."):
+        value = getattr(value, part, None)
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _check(
+    around: Neighbourhood, journal: Journal, config: StudyConfig, place: str, step: float
+) -> Check:
+    """Return the central difference of two solves."""
+    ends = []
+    for sign in (-1.0, 1.0):
+        values = _moved(around.optimum, place, 1.0 + sign * step)
+        found = journal.resolve(f"{place}{sign * step:+g}", with_values(config, values))
+        if not found.converged:
+            raise NotConvergedError(f"the check of {place} did not converge: {found.result.status}")
+        ends.append(found)
+    below, above = (measures(end) for end in ends)
+    unit = 2.0 * step
+    return Check(
+        place,
+        step,
+        {key: (above[key] - below[key]) / unit for key in above},
+        sum(end.result.iterations for end in ends),
+        sum(end.result.seconds for end in ends),
+        max(around.changed_activity(end) for end in ends),
+    )
+
+
+def _moved(optimum: Optimum, place: str, factor: float) -> dict[str, Any]:
+    """Return config values with one number scaled."""
+    config = optimum.config
+    if place in STIFFNESSES:
+        stiffness = factor * float(optimum.stiffness[STIFFNESSES.index(place)])
+        return {"bounds.stiffness": {**config.bounds.stiffness, place: [stiffness, stiffness]}}
+    scale = dict(config.variation.scale)
+    return {"variation.scale": {**scale, place: factor * scale.get(place, 1.0)}}

@@ -1,0 +1,59 @@
+"""The figure of a sensitivity study: which numbers matter most for what."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.style import NEUTRAL, PAGE, STYLE, dress, new_figure
+from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.studies.sensitivity import Sensitivities
+from pathwalker_cli.studies.sensitivity_text import label_of
+
+__all__ = ["save_sensitivity_figure", "sensitivity_figure"]
+
+_PANELS: Final = (
+    "cost",
+    "min_stance_knee_flexion_right",
+    "min_stance_knee_flexion_left",
+    "step_length_right",
+    "step_length_left",
+    "stride_time",
+)
+_BARS: Final = 8
+"""Numbers shown per panel, the strongest ones."""
+
+_MORE, _LESS = "#0072B2", "#D55E00"
+
+
+def sensitivity_figure(result: Sensitivities) -> Figure:
+    """Return the strongest elasticities of cost, crouch, steps and stride time as bars."""
+    fig = new_figure(PAGE, 5.4)
+    for axes, key in zip(fig.subplots(3, 2).ravel(), _PANELS, strict=True):
+        values = {row.place: row.elasticities.get(key) or 0.0 for row in result.rows}
+        strongest = sorted(values, key=lambda place: -abs(values[place]))[:_BARS][::-1]
+        numbers = np.array([values[place] for place in strongest])
+        colours = [_MORE if number >= 0.0 else _LESS for number in numbers]
+        hatches = ["" if number >= 0.0 else "////" for number in numbers]
+        axes.barh(
+            range(len(strongest)), numbers, color=colours, hatch=hatches, edgecolor="white",
+            linewidth=0.3,
+        )  # fmt: skip
+        axes.set_yticks(range(len(strongest)), [label_of(place) for place in strongest])
+        axes.axvline(0.0, color=NEUTRAL, linewidth=0.6)
+        dress(axes, measure_of(key).label, "elasticity [% per %]")
+    return fig
+
+
+def save_sensitivity_figure(result: Sensitivities, folder: Path) -> None:
+    """Write `sensitivity.png` and `sensitivity.svg`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with mpl.rc_context(STYLE):
+        figure = sensitivity_figure(result)
+        for extension in ("png", "svg"):
+            save_figure(figure, folder / f"sensitivity.{extension}")

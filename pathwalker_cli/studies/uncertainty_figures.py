@@ -1,0 +1,172 @@
+"""Figures of an uncertainty study: where springs and gait end up, and what they follow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from pathwalker_cli.output.cycle import BOTH_SIDES
+from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.style import (
+    LINE_COLOUR,
+    NEUTRAL,
+    PAGE,
+    SMALL,
+    STYLE,
+    dress,
+    legend,
+    new_figure,
+)
+from pathwalker_cli.studies.measures import Measure
+from pathwalker_cli.studies.uncertainty_result import Spread, Uncertainty, chance_level, spreads
+
+__all__ = ["correlation_figure", "save_uncertainty_figures", "spread_figure"]
+
+_MARKER: Final = {"right": "o", "left": "s"}
+_STRIP: Final = 0.22
+"""Half the height over which points of a row are scattered, so that equal ones can be told."""
+
+_SEED: Final = 0
+
+_TICKS: Final = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+"""Marks on the axis of stiffness [N m/rad]."""
+
+
+def save_uncertainty_figures(result: Uncertainty, folder: Path) -> None:
+    """Save all figures as PNG and SVG; none without draws that converged."""
+    if not result.converged:
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    found = spreads(result)
+    figures = {
+        "uncertainty": spread_figure(result, found),
+        "correlations": correlation_figure(result, found),
+    }
+    for name, figure in figures.items():
+        for extension in ("png", "svg"):
+            save_figure(figure, folder / f"{name}.{extension}")
+
+
+def spread_figure(result: Uncertainty, found: list[Spread]) -> Figure:
+    """Return the springs of all draws in their ranges, and cost and gait around the base."""
+    springs = [spread for spread in found if spread.measure.key in result.ranges]
+    others = [spread for spread in found if spread.measure.key not in result.ranges]
+    with mpl.rc_context(STYLE):
+        fig = new_figure(PAGE, 0.9 + 0.34 * max(len(springs) + 1, len(others)))
+        left, right = fig.subplots(1, 2)
+        for y, spread in enumerate(springs):
+            low, high = result.ranges[spread.measure.key]
+            left.plot([low, high], [y, y], color="#cccccc", linewidth=7.0, solid_capstyle="butt")
+            _draw(left, y, result.values(spread.measure.key), spread, 1.0)
+            left.text(high, y - 0.3, _limits(spread), ha="right", va="bottom", fontsize=SMALL)
+        _rows(left, [_spring(spread.measure) for spread in springs], -0.95)
+        dress(left, "Identified springs", "stiffness [N m/rad], logarithmic")
+        _stiffness_axis(left)
+        for y, spread in enumerate(others):
+            values = 100.0 * (result.values(spread.measure.key) / spread.base - 1.0)
+            _draw(right, y, values, spread, 100.0)
+        _rows(right, [spread.measure.label for spread in others], -0.6)
+        right.axvline(0.0, color=NEUTRAL, linewidth=0.6)
+        dress(right, "Cost and gait", "deviation from the base [%]")
+        for ax in (left, right):
+            ax.grid(visible=False, axis="y")
+        legend(fig, _handles(len(result.converged)))
+        return fig
+
+
+def _draw(ax: Axes, y: int, values: np.ndarray, spread: Spread, unit: float) -> None:
+    """Draw the draws of one measure, their median and range, and the base.
+
+    Args:
+        ax: Where.
+        y: Its row.
+        values: What is drawn, in the unit of the axis.
+        spread: The measure.
+        unit: 100 for deviations in %, where the base is zero; 1 for the values themselves.
+    """
+    side = next((side for side in BOTH_SIDES if side in spread.measure.key), None)
+    colour, marker = (LINE_COLOUR[side], _MARKER[side]) if side else (NEUTRAL, "^")
+    heights = y + np.random.default_rng(_SEED).uniform(-_STRIP, _STRIP, len(values))
+    ax.plot(values, heights, marker, color=colour, markersize=2.6, alpha=0.45, mew=0.0)
+    low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
+    ax.plot([low, high], [y, y], color=colour, linewidth=1.6)
+    ax.plot(middle, y, marker, color=colour, markersize=5.5, mec="white", mew=0.6)
+    base = spread.base if unit == 1.0 else 0.0
+    ax.plot(base, y, "|", color="black", markersize=13.0, mew=1.0)
+
+
+def _stiffness_axis(ax: Axes) -> None:
+    """Let soft springs have as much room as stiff ones."""
+    ax.set_xscale("log")
+    ax.minorticks_off()
+    low, high = ax.get_xlim()
+    ticks = [tick for tick in _TICKS if low <= tick <= high]
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+
+
+def _spring(measure: Measure) -> str:
+    symbol, side = measure.label.split()
+    return f"${symbol[0]}_{symbol[-1]}$ {side}"
+
+
+def _limits(spread: Spread) -> str:
+    """Return how often a spring sits at a limit."""
+    if spread.lower is None or spread.upper is None:
+        return "prescribed"
+    return f"at lower limit {100.0 * spread.lower:.0f} %, at upper {100.0 * spread.upper:.0f} %"
+
+
+def _rows(ax: Axes, labels: list[str], top: float) -> None:
+    ax.set_yticks(range(len(labels)), labels)
+    ax.set_ylim(len(labels) - 0.5, top)
+
+
+def _handles(count: int) -> list[Artist]:
+    """Return the entries of the legend."""
+    point: dict[str, Any] = {"color": NEUTRAL, "linewidth": 0}
+    sides: list[Artist] = [
+        Line2D(
+            [], [], color=LINE_COLOUR[s], marker=_MARKER[s], linewidth=0, markersize=4.5, label=s
+        )
+        for s in reversed(BOTH_SIDES)
+    ]
+    return [
+        *sides,
+        Line2D([], [], marker="^", markersize=2.6, alpha=0.45, label=f"{count} draws", **point),
+        Line2D([], [], color=NEUTRAL, marker="^", markersize=5.5, label="median, 90 % of draws"),
+        Line2D([], [], color="black", marker="|", markersize=9.0, linewidth=0, label="base"),
+        Patch(facecolor="#cccccc", label="range of real springs"),
+    ]
+
+
+def correlation_figure(result: Uncertainty, found: list[Spread]) -> Figure:
+    """Return the rank correlation of every input with every measure as a coloured table."""
+    inputs = [entry.place for entry in result.draws.inputs]
+    table = np.array([spread.correlations for spread in found]).T
+    level = chance_level(len(result.converged), len(inputs))
+    with mpl.rc_context(STYLE):
+        fig = new_figure(PAGE, 1.6 + 0.16 * len(inputs))
+        ax = fig.subplots()
+        # blue and orange with white between: signs differ for any colour vision
+        image = ax.imshow(table, cmap="PuOr_r", vmin=-1.0, vmax=1.0, aspect="auto")
+        for (y, x), value in np.ndenumerate(table):
+            if np.isfinite(value) and abs(value) > level:
+                colour = "white" if abs(value) > 0.6 else "black"
+                ax.text(x, y, f"{value:+.2f}", ha="center", va="center", color=colour, fontsize=6.5)
+            elif not np.isfinite(value):
+                ax.text(x, y, "-", ha="center", va="center", color=NEUTRAL, fontsize=6.5)
+        ax.set_yticks(range(len(inputs)), inputs)
+        ax.set_xticks(range(len(found)), [s.measure.short for s in found], rotation=45, ha="right")
+        ax.tick_params(labelsize=SMALL, length=0.0)
+        ax.set_title(f"Rank correlation; numbers where chance ({level:.2f}) does not explain it")
+        bar = fig.colorbar(image, ax=ax, pad=0.01)
+        bar.ax.tick_params(labelsize=SMALL)
+        return fig

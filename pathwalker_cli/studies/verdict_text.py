@@ -1,0 +1,97 @@
+"""The verdict on an identification in plain language."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from pathwalker_cli.conventions import to_degrees
+from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, StopVerdict, Verdict
+
+__all__ = ["verdict_lines"]
+
+_SOFTER: Final = {"lower": ("softer", -1.0), "upper": ("stiffer", 1.0)}
+
+
+def verdict_lines(verdict: Verdict) -> Iterator[tuple[str, str]]:
+    """Yield label and text of every line."""
+    for spring in verdict.springs:
+        yield measure_of(spring.spring).label, _spring(spring)
+    reached = [stop for stop in verdict.stops if stop.excess > 0.0]
+    yield "hard stops", "; ".join(map(_stop, reached)) or "none is reached"
+    if verdict.starts > 1:
+        yield "other optima", _optima(verdict)
+    else:
+        yield "other optima", "not searched for: `starts: 8` looks from several starts"
+    yield "real springs", _snapped(verdict)
+    yield "verdict", f"{verdict.solves} problems solved around the optimum, {verdict.seconds:.1f} s"
+
+
+def _per_degree(stiffness: float) -> float:
+    """Return a stiffness in N m/deg."""
+    return float(np.deg2rad(stiffness))
+
+
+def _spring(spring: SpringVerdict) -> str:
+    low, high = spring.region
+    text = (
+        f"{spring.stiffness:.1f} N m/rad ({_per_degree(spring.stiffness):.2f} N m/deg): "
+        f"{spring.determined}; the cost stays within {100 * SHARE:g} % of the best from "
+        f"{low:.1f} to {high:.1f} N m/rad ({_per_degree(low):.2f} to {_per_degree(high):.2f} "
+        f"N m/deg), {100 * spring.width:.0f} % of the springs that are allowed"
+    )
+    far = [end for end, again in zip(spring.range, spring.again, strict=True) if again]
+    if far:
+        ends = " and ".join(f"{end:.1f}" for end in far)
+        text += f", and is as good again at {ends} N m/rad, another local optimum"
+    if spring.limit:
+        word, sign = _SOFTER[spring.limit]
+        saved = -100.0 * sign * spring.gradient * _ten_percent(spring)
+        text += (
+            f"; it sits at the {spring.limit} limit: {_ten_percent(spring):.1f} N m/rad {word} "
+            f"would save about {saved:.2g} % more"
+        )
+    if not spring.certain:
+        text += "; the ends of this region are not certain: the problems beyond did not converge"
+    return text
+
+
+def _ten_percent(spring: SpringVerdict) -> float:
+    """Return a tenth of the stiffness [N m/rad]: a step that makes a difference to a hand."""
+    return 0.1 * spring.stiffness
+
+
+def _stop(stop: StopVerdict) -> str:
+    return (
+        f"{stop.side} {stop.stop} stop ({to_degrees(abs(stop.angle)):.1f} deg) exceeded by "
+        f"{to_degrees(stop.excess):.1f} deg, {100 * stop.share:.0f} % of the stride"
+    )
+
+
+def _optima(verdict: Verdict) -> str:
+    others = verdict.optima[1:]
+    text = f"{len(others)} of {verdict.starts - 1} other starts end within {100 * SHARE:g} %"
+    if not others:
+        return text
+    spread = []
+    for i, spring in enumerate(verdict.springs):
+        values = [optimum.stiffness[i] for optimum in verdict.optima]
+        spread.append(f"{measure_of(spring.spring).label} {min(values):.0f} to {max(values):.0f}")
+    return f"{text}, with {', '.join(spread)} N m/rad"
+
+
+def _snapped(verdict: Verdict) -> str:
+    snapped = verdict.snapped
+    if snapped is None:
+        return "the patient's file lists none (orthosis.springs)"
+    chosen = ", ".join(
+        f"{measure_of(name).label} {snapped.names[name]} ({stiffness:.1f} N m/rad, "
+        f"{_per_degree(stiffness):.2f} N m/deg)"
+        for name, stiffness in snapped.stiffness.items()
+    )
+    if snapped.status == "converged":
+        return f"{chosen}: cost {100 * snapped.rise:+.2g} %, {snapped.walking_speed:.3f} m/s"
+    return f"{chosen}: estimated cost {100 * snapped.rise:+.2g} % (solving it: {snapped.status})"

@@ -1,0 +1,324 @@
+"""The command `uncertainty`: repeatable draws, honest counts, and what matters most."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from neighbours_stand_in import StandInOptimum, StandInResolver, stand_in_measures
+from pathwalker_cli.cli import cli
+from pathwalker_cli.config import load_config, study_patient, with_values
+from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.ocp.solution import GaitSolution
+from pathwalker_cli.output import run_folder
+from pathwalker_cli.output.run_folder import write_run
+from pathwalker_cli.patient import load_patient
+from pathwalker_cli.studies import pool
+from pathwalker_cli.studies import uncertainty as module
+from pathwalker_cli.studies.base import base_run, load_study
+from pathwalker_cli.studies.draws import Distribution, Draws, Input, draw, inputs_of
+from pathwalker_cli.studies.uncertainty import UncertaintyStudy, draw_configs, uncertainty
+from pathwalker_cli.studies.uncertainty_result import chance_level, rank_correlations, spreads
+
+MadeSolution = Callable[..., GaitSolution]
+PATIENT = load_patient("sreenivasa2017-patient")
+
+
+# Distributions and draws
+
+
+def drawn(count: int = 4000, **changes: Any) -> np.ndarray:
+    """Return draws of one input."""
+    single = Input("body_mass", Distribution(**changes))
+    return draw((single,), count, 1).values[:, 0]
+
+
+def test_normal_draws_have_mean_and_spread_and_end_at_three() -> None:
+    factors = drawn(kind="normal", relative=0.1)
+    assert factors.mean() == pytest.approx(1.0, abs=1e-3)
+    assert factors.std() == pytest.approx(0.1 * 0.98658, rel=1e-3), "truncated at three"
+    assert np.abs(factors - 1.0).max() <= 0.3
+    shifts = drawn(kind="normal", absolute=0.02)
+    assert shifts.mean() == pytest.approx(0.0, abs=1e-4)
+    assert shifts.std() == pytest.approx(0.02 * 0.98658, rel=1e-3)
+
+
+def test_uniform_draws_fill_their_width() -> None:
+    shifts = drawn(kind="uniform", absolute=0.03)
+    assert np.abs(shifts).max() == pytest.approx(0.03, rel=1e-3)
+    assert shifts.std() == pytest.approx(0.03 / np.sqrt(3.0), rel=1e-3)
+
+
+def test_lognormal_draws_are_factors_with_median_one() -> None:
+    factors = drawn(kind="lognormal", relative=0.5)
+    assert np.median(factors) == pytest.approx(1.0, rel=1e-3)
+    assert np.log(factors).std() == pytest.approx(0.5 * 0.98658, rel=1e-3)
+    assert factors.min() > 0.0
+
+
+def test_equal_seeds_give_equal_draws_evenly_spread() -> None:
+    flat = Distribution(kind="uniform", absolute=0.01)
+    pair = (Input("body_mass", Distribution(relative=0.03)), Input("orthosis.neutral_angle", flat))
+    one, same, other = (draw(pair, 20, seed).values for seed in (3, 3, 4))
+    assert np.array_equal(one, same)
+    assert not np.array_equal(one, other)
+    cells = np.floor((one[:, 1] / 0.01 + 1.0) * 10.0)
+    assert sorted(cells) == list(range(20)), "one draw in every twentieth"
+
+
+def test_each_draws_every_number_for_itself_and_otherwise_all_together() -> None:
+    each = inputs_of({"strengths": Distribution(relative=0.1, each=True)}, PATIENT)
+    assert len(each) == 14
+    assert {"strengths.hip_flexion.left", "strengths.lumbar_flexion"} <= {i.place for i in each}
+    common = inputs_of({"strengths": Distribution(relative=0.1)}, PATIENT)
+    assert [entry.place for entry in common] == ["strengths"]
+    ranges = inputs_of({"recorded.barefoot.joint_ranges": Distribution(absolute=0.03, each=True)},
+                       PATIENT)  # fmt: skip
+    assert len(ranges) == 8, "both ends of a range stay together"
+
+
+def test_lengths_left_to_proportions_can_be_drawn() -> None:
+    lengths = PATIENT.segment_lengths.model_copy(update={"thigh": None})
+    bare = PATIENT.model_copy(update={"segment_lengths": lengths})
+    found = inputs_of({"segment_lengths.thigh": Distribution(relative=0.02, each=True)}, bare)
+    assert [entry.place for entry in found] == [
+        "segment_lengths.thigh.right", "segment_lengths.thigh.left",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("quantities", "words"),
+    [
+        ({"strenghts": {"relative": 0.1}}, "did you mean strengths?"),
+        ({"strengths.hip": {"relative": 0.1}}, "quantities.strengths.hip"),
+        ({"id": {"relative": 0.1}}, "has no 'id'"),
+        (
+            {"strengths": {"relative": 0.1, "each": True},
+             "strengths.lumbar_flexion": {"relative": 0.2}},
+            "draws strengths.lumbar_flexion twice",
+        ),
+    ],
+)  # fmt: skip
+def test_places_that_do_not_exist_are_refused(
+    quantities: dict[str, dict[str, Any]], words: str
+) -> None:
+    given = {place: Distribution(**entry) for place, entry in quantities.items()}
+    with pytest.raises(ConfigError, match=words.replace("?", r"\?")):
+        inputs_of(given, PATIENT)
+
+
+def test_a_draw_comes_on_top_of_what_the_base_varies() -> None:
+    config = with_values(load_config("mapd-orthosis"), {"variation.scale": {"body_mass": 1.1}})
+    draws = Draws((Input("body_mass", Distribution(relative=0.1)),), np.array([[0.9], [1.05]]))
+    masses = [study_patient(c).body_mass / PATIENT.body_mass for c in draw_configs(config, draws)]
+    assert masses == pytest.approx([0.99, 1.155])
+
+
+# Statistics
+
+
+def test_rank_correlations_find_monotonous_and_no_relations() -> None:
+    x = np.random.default_rng(0).uniform(size=(200, 3))
+    found = rank_correlations(x, np.exp(5.0 * x[:, 1]))
+    assert found[1] == pytest.approx(1.0)
+    assert np.abs(found[[0, 2]]).max() < 0.2
+    assert np.isnan(rank_correlations(x, np.full(200, 92.0))).all()
+
+
+def test_chance_level_is_exceeded_by_idle_inputs_in_five_of_a_hundred_studies() -> None:
+    rng, level = np.random.default_rng(1), chance_level(60, 10)
+    strongest = [
+        np.abs(rank_correlations(rng.uniform(size=(60, 10)), rng.uniform(size=60))).max()
+        for _ in range(400)
+    ]
+    assert 0.02 < np.mean(np.array(strongest) > level) < 0.09
+
+
+# The command
+
+
+@pytest.fixture(scope="module")
+def run_folder_path(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "orthosis"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_folder, "save_figures", lambda *_: ())
+        write_run(folder, made_solution("mapd-orthosis"))
+    return folder
+
+
+@pytest.fixture
+def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
+    stand_in = StandInResolver(load_config("mapd-orthosis"))
+    for place in (module, pool):
+        monkeypatch.setattr(place, "resolver_of", lambda run, tolerance: stand_in)
+        monkeypatch.setattr(place, "measures", stand_in_measures)
+    return stand_in
+
+
+@pytest.fixture
+def call(run_folder_path: Path, resolver: StandInResolver, tmp_path: Path) -> Callable[..., Result]:
+    study = tmp_path / "study.yaml"
+    study.write_text(
+        "base: mapd-orthosis\ndraws: 20\nquantities:\n"
+        "  strengths: {relative: 0.1}\n  body_mass: {relative: 0.03}\n"
+        "  orthosis.neutral_angle: {kind: uniform, absolute: 0.01}\n",
+        encoding="utf-8",
+    )
+
+    def run(*words: object) -> Result:
+        options = ["--run", run_folder_path, "--out", tmp_path / "out", "--workers", 1, *words]
+        return CliRunner().invoke(cli, ["uncertainty", str(study), *map(str, options)])
+
+    return run
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_command_tells_spreads_limits_and_what_matters(
+    call: Callable[..., Result], resolver: StandInResolver, tmp_path: Path
+) -> None:
+    result = call()
+    assert result.exit_code == 0, result.output
+    assert "20 draws of 3 inputs, 20 converged" in result.output
+    assert "K_D right: at its lower limit of 5 N m/rad in 0 % of the draws" in result.output
+    assert "in 100 % of the draws, at its upper one of 92 in 0 %" in result.output, "K_P left"
+    rows = {row["measure"]: row for row in table(tmp_path / "out" / "uncertainty.csv")}
+    assert rows["cost"]["strongest input"] == "strengths"
+    assert float(rows["cost"]["rank correlation [1]"]) == pytest.approx(-1.0)
+    assert rows["walking_speed"]["strongest input"] == "body_mass"
+    assert rows["step_length_left"]["strongest input"] == ""
+    assert rows["dorsiflexion_stiffness_right"]["share at upper limit [1]"] == "1"
+    assert rows["cost"]["share at upper limit [1]"] == ""
+    cost = [float(row["cost [1]"]) for row in table(tmp_path / "out" / "draws.csv")]
+    for name, q in (("quantile 0.05", 0.05), ("median", 0.5), ("quantile 0.95", 0.95)):
+        assert float(rows["cost"][name]) == pytest.approx(np.quantile(cost, q), rel=1e-6)
+    assert len(table(tmp_path / "out" / "correlations.csv")) == 3
+    for name in ("uncertainty.png", "uncertainty.svg", "correlations.png", "correlations.svg"):
+        assert (tmp_path / "out" / "figures" / name).stat().st_size > 1000
+    assert len(resolver.solved) == 20
+
+
+def test_every_draw_can_be_solved_again_from_its_row(
+    call: Callable[..., Result], resolver: StandInResolver, tmp_path: Path
+) -> None:
+    call()
+    for row, solved in zip(table(tmp_path / "out" / "draws.csv"), resolver.solved, strict=True):
+        again = load_config("mapd-orthosis", changes=(f"variation={row['variation']}",))
+        assert again.variation == solved.variation
+        assert float(row["strengths [factor]"]) == solved.variation.scale["strengths"]
+        assert json.loads(row["variation"])["shift"].keys() == {"orthosis.neutral_angle"}
+
+
+def test_failed_draws_are_counted_and_told(
+    call: Callable[..., Result], resolver: StandInResolver, tmp_path: Path
+) -> None:
+    resolver.fails = lambda config: config.variation.scale["strengths"] < 0.9
+    result = call()
+    assert result.exit_code == 1
+    rows = table(tmp_path / "out" / "draws.csv")
+    failed = [row for row in rows if row["status"] != "converged"]
+    assert 0 < len(failed) < 10
+    assert all(float(row["strengths [factor]"]) < 0.9 and row["cost [1]"] == "" for row in failed)
+    assert f"{len(failed)} draws (" in result.output
+    assert f"draw {failed[0]['draw']}: the iteration limit was reached; strengths x 0." in (
+        result.output
+    )
+    assert f"{len(failed)} of 20 draws did not converge" in result.output
+    assert table(tmp_path / "out" / "uncertainty.csv")[0]["draws [1]"] == str(20 - len(failed))
+
+
+def test_all_draws_may_fail(call: Callable[..., Result], resolver: StandInResolver) -> None:
+    resolver.fails = lambda config: True
+    result = call()
+    assert result.exit_code == 1
+    assert "20 draws of 3 inputs, 0 converged" in result.output
+    assert "nan" not in result.output
+
+
+def test_a_killed_study_goes_on_where_it_was(
+    call: Callable[..., Result],
+    resolver: StandInResolver,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solve = resolver.resolve
+
+    def dying(config: Any, start: Any = None) -> StandInOptimum:
+        if len(resolver.solved) == 7:
+            raise KeyboardInterrupt
+        return solve(config, start)
+
+    monkeypatch.setattr(resolver, "resolve", dying)
+    assert call().exit_code != 0
+    assert len(list((tmp_path / "out" / "draws").iterdir())) == 7
+    monkeypatch.setattr(resolver, "resolve", solve)
+    resolver.solved.clear()
+    result = call()
+    assert result.exit_code == 0
+    assert len(resolver.solved) == 13
+    assert "7 were there already" in result.output
+    whole = (tmp_path / "out" / "draws.csv").read_text(encoding="utf-8")
+    call("--out", tmp_path / "anew")
+    assert (tmp_path / "anew" / "draws.csv").read_text(encoding="utf-8") == whole
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("quantities={strenghts: {relative: 0.1}}",), "did you mean strengths?"),
+        (("quantities={}",), "quantities"),
+        (("quantities={strengths: {relative: 0.1, absolute: 1.0}}",), "one of the two"),
+        (("quantities={strengths: {each: true}}",), "neither relative nor absolute"),
+        (("quantities={strengths: {kind: lognormal, absolute: 1.0}}",), "it is one of factors"),
+        (("quantities={strengths: {relative: 0.5}}",), "factors stay positive"),
+        (("quantities={strengths: {kind: beta, relative: 0.1}}",), "lognormal"),
+        (("quantities={orthosis.neutral_angle: {absolute: 0.1}}",), "gives a patient who is"),
+        (("draws=1",), "draws"),
+        (("set={bounds.friction: 0.7}",), "--run"),
+    ],
+)
+def test_refusals(call: Callable[..., Result], words: tuple[str, ...], message: str) -> None:
+    result = call(*[part for word in words for part in ("--set", word)])
+    assert result.exit_code == 2, result.output
+    assert message in result.output
+    assert len(result.output.splitlines()) == 1
+
+
+def test_shipped_config_fits_the_shipped_patient() -> None:
+    study = load_study("uncertainty", UncertaintyStudy)
+    inputs = inputs_of(study.quantities, PATIENT)
+    configs = draw_configs(load_config("mapd-orthosis"), draw(inputs, study.draws, study.seed))
+    assert len(configs) == 100
+
+
+@pytest.mark.slow
+def test_real_draws_do_not_depend_on_the_number_of_processes(tmp_path: Path) -> None:
+    coarse = {"mesh.intervals": 16, "mesh.refinements": 0, "solver.first_tolerance": 1e-6}
+    config = with_values(load_config("mapd-orthosis"), coarse)
+    run = base_run(config, tmp_path / "base")
+    quantities = {
+        "strengths": Distribution(relative=0.05),
+        "body_mass": Distribution(relative=0.02),
+    }
+    study = UncertaintyStudy(base="x", draws=4, quantities=quantities)
+    one = uncertainty(study, run, tmp_path / "one", 1)
+    two = uncertainty(study, run, tmp_path / "two", 2)
+    assert not one.failed
+    for a, b in zip(one.solved, two.solved, strict=True):
+        assert a.values == pytest.approx(b.values, rel=1e-9)
+    found = {spread.measure.key: spread for spread in spreads(one)}
+    assert found["cost"].quantiles[0] < found["cost"].quantiles[2]
+    for name in STIFFNESSES:
+        low, high = one.ranges[name]
+        assert all(low <= value <= high for value in one.values(name))

@@ -1,0 +1,185 @@
+"""What is said of an identified stiffness: regions, limits, stops, optima and real springs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from conftest import MadeSolution
+from helpers import stylised_series
+from pathwalker_cli.config import load_config, smoke_version, with_values
+from pathwalker_cli.errors import PatientError
+from pathwalker_cli.io.yaml_file import validate
+from pathwalker_cli.ocp.solution import LocalOptimum
+from pathwalker_cli.ocp.solve import GaitSolver
+from pathwalker_cli.patient import load_patient
+from pathwalker_cli.patient_blocks import SpringSet
+from pathwalker_cli.studies.verdict import (
+    SHARE,
+    SnappedSprings,
+    SpringVerdict,
+    StopVerdict,
+    Verdict,
+    _quadratic_edge,
+    _stops,
+    verdict_of,
+)
+from pathwalker_cli.studies.verdict_text import verdict_lines
+
+INSIDE = SpringVerdict(
+    "plantarflexion_stiffness_right", 20.0, (5.0, 92.0), "", 0.0, 1e-4, (15.0, 30.0),
+    (False, False), True,
+)  # fmt: skip
+AT_LIMIT = SpringVerdict(
+    "dorsiflexion_stiffness_left", 92.0, (5.0, 92.0), "upper", -2e-3, 1e-5, (60.0, 92.0),
+    (False, True), True,
+)  # fmt: skip
+OPTIMUM = LocalOptimum(0, "synthetic", "converged", 0.25, 0.64, (20.0, 92.0), 10, 1.0)
+
+
+def verdict(**changes: object) -> Verdict:
+    """Return a verdict."""
+    made = Verdict((INSIDE, AT_LIMIT), (), None, (), 0, 7, 3.0)
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+def text(made: Verdict) -> dict[str, str]:
+    """Return the lines by label."""
+    return dict(verdict_lines(made))
+
+
+@pytest.mark.parametrize(
+    ("region", "words"),
+    [((15.0, 30.0), "determined"), ((10.0, 60.0), "roughly determined"),
+     ((5.0, 92.0), "not determined")],
+)  # fmt: skip
+def test_the_width_of_the_region_decides_the_words(region: tuple[float, float], words: str) -> None:
+    assert replace(INSIDE, region=region).determined == words
+
+
+def test_stiffness_is_told_per_radian_and_per_degree() -> None:
+    line = text(verdict())["K_P right"]
+    assert "20.0 N m/rad (0.35 N m/deg)" in line
+    assert "from 15.0 to 30.0 N m/rad (0.26 to 0.52 N m/deg)" in line
+    assert "17 % of the springs" in line
+
+
+def test_a_limit_says_what_lies_beyond_it() -> None:
+    line = text(verdict())["K_D left"]
+    assert "sits at the upper limit: 9.2 N m/rad stiffer would save about 1.8 % more" in line
+    soft = replace(AT_LIMIT, limit="lower", gradient=2e-3, stiffness=5.0, region=(5.0, 9.0))
+    line = text(verdict(springs=(soft,)))["K_D left"]
+    assert "sits at the lower limit: 0.5 N m/rad softer would save about 0.1 % more" in line
+
+
+def test_uncertain_ends_are_admitted() -> None:
+    line = text(verdict(springs=(replace(INSIDE, certain=False),)))["K_P right"]
+    assert "not certain" in line
+
+
+def test_another_optimum_at_a_limit_is_told() -> None:
+    far = replace(INSIDE, again=(False, True))
+    assert far.determined == "not determined"
+    assert "as good again at 92.0 N m/rad" in text(verdict(springs=(far,)))["K_P right"]
+
+
+def test_stops_that_are_reached_are_named() -> None:
+    assert text(verdict())["hard stops"] == "none is reached"
+    stop = StopVerdict("right", "dorsiflexion", -0.13, 0.05, 0.4)
+    away = StopVerdict("left", "dorsiflexion", -0.13, -0.01, 0.0)
+    line = text(verdict(stops=(stop, away)))["hard stops"]
+    assert line == "right dorsiflexion stop (7.4 deg) exceeded by 2.9 deg, 40 % of the stride"
+
+
+def test_stops_are_measured_on_the_stride() -> None:
+    series = stylised_series()
+    fixed = series.walker.orthosis
+    assert fixed is not None
+    found = {(stop.side, stop.stop): stop for stop in _stops(series)}
+    ankle = series.column("ankle_r")
+    expected = fixed[0].dorsiflexion_stop - ankle.min()
+    assert found["right", "dorsiflexion"].excess == pytest.approx(expected)
+    assert (found["right", "dorsiflexion"].share > 0.0) == (expected > 0.0)
+
+
+def test_other_optima_are_counted_with_their_springs() -> None:
+    assert "starts: 8" in text(verdict())["other optima"]
+    other = replace(OPTIMUM, start=1, stiffness=(80.0, 91.0))
+    line = text(verdict(optima=(OPTIMUM, other), starts=4))["other optima"]
+    assert line.startswith("1 of 3 other starts end within 5 %")
+    assert "K_P right 20 to 80" in line
+
+
+def test_real_springs_and_their_price() -> None:
+    assert "lists none" in text(verdict())["real springs"]
+    name = INSIDE.spring
+    snapped = SnappedSprings({name: "flexible"}, {name: 40.1}, 0.012, 0.64, "converged")
+    line = text(verdict(snapped=snapped))["real springs"]
+    assert line == "K_P right flexible (40.1 N m/rad, 0.70 N m/deg): cost +1.2 %, 0.640 m/s"
+    failed = replace(snapped, status="the iteration limit was reached")
+    assert "estimated cost" in text(verdict(snapped=failed))["real springs"]
+
+
+def test_a_verdict_is_plain_values() -> None:
+    plain = json.loads(json.dumps(verdict().as_dict()))
+    assert plain["springs"][0]["determined"] == "determined"
+    assert plain["springs"][0]["region"] == [15.0, 30.0]
+
+
+@pytest.mark.parametrize("slope", [0.0, 1e-3, -1e-3])
+def test_the_quadratic_edge_meets_the_share(slope: float) -> None:
+    edge = _quadratic_edge(slope, 1e-4)
+    slope = max(slope, 0.0)
+    assert slope * edge + 1e-4 * edge**2 / 2.0 == pytest.approx(SHARE)
+    assert np.isfinite(_quadratic_edge(0.0, -1.0))
+
+
+def test_there_is_no_verdict_without_springs(made_solution: MadeSolution) -> None:
+    assert verdict_of(made_solution("mapd-barefoot")) is None
+
+
+def test_there_is_no_verdict_on_what_did_not_converge(made_solution: MadeSolution) -> None:
+    assert verdict_of(made_solution(status="the iteration limit was reached")) is None
+
+
+def test_smoke_runs_are_not_judged() -> None:
+    assert load_config("mapd-orthosis").verdict
+    assert not smoke_version(load_config("mapd-orthosis")).verdict
+
+
+@pytest.mark.parametrize(
+    ("springs", "words"),
+    [([], "at least 1"), ([{"name": "a", "stiffness": 0.7}], "N m per degree"),
+     ([{"name": "a", "stiffness": 40.0}, {"name": "a", "stiffness": 50.0}], "twice")],
+)  # fmt: skip
+def test_a_wrong_list_of_springs_is_refused(springs: list[object], words: str) -> None:
+    mapping = {"dorsiflexion": springs, "plantarflexion": springs, "source": "a catalogue"}
+    with pytest.raises(PatientError, match=words):
+        validate(mapping, SpringSet, error=PatientError)
+
+
+def test_the_shipped_springs_lie_in_their_range() -> None:
+    worn = load_patient("sreenivasa2017-patient").require_orthosis()
+    assert worn.springs is not None
+    for kind in ("dorsiflexion", "plantarflexion"):
+        low, high = getattr(worn.stiffness_range, kind)
+        assert all(low <= spring.stiffness <= high for spring in getattr(worn.springs, kind))
+
+
+@pytest.mark.slow
+def test_a_real_verdict_encloses_the_identified_springs() -> None:
+    config = load_config("mapd-orthosis")
+    config = with_values(config, {"mesh.intervals": 24, "mesh.refinements": 0})
+    solution = GaitSolver(config).solve()
+    found = verdict_of(solution)
+    assert found is not None
+    for spring in found.springs:
+        low, high = spring.region
+        assert low - 1e-3 <= spring.stiffness <= high + 1e-3
+        assert spring.certain
+    assert found.snapped is not None
+    assert found.snapped.status == "converged"
+    assert found.snapped.rise > -1e-3
