@@ -25,7 +25,6 @@ from pathwalker_cli.commands import doctor
 from pathwalker_cli.commands.progress import Progress
 from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.model.urdf import urdf_text
-from pathwalker_cli.ocp import solve as ocp_solve
 from pathwalker_cli.ocp.ipopt import ProgressReport
 from pathwalker_cli.ocp.series import gait_series
 from pathwalker_cli.ocp.solution import GaitSolution
@@ -34,6 +33,8 @@ from pathwalker_cli.output import run_folder
 from pathwalker_cli.output.metrics import gait_metrics
 from pathwalker_cli.output.run_folder import ENTRIES, load_run, write_run
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.studies import run as study_run
+from test_verdict import verdict
 
 MadeSolution = Callable[..., GaitSolution]
 Smoke = tuple[Path, subprocess.CompletedProcess[str]]
@@ -306,7 +307,8 @@ class _Solver:
 def ends(monkeypatch: pytest.MonkeyPatch, here: Path) -> Callable[[GaitSolution], None]:
     """Return a function that decides how the next solves end."""
     monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
-    monkeypatch.setattr(ocp_solve, "GaitSolver", _Solver)
+    monkeypatch.setattr(study_run, "GaitSolver", _Solver)
+    monkeypatch.setattr(study_run, "verdict_of", lambda solution: None)
 
     def decide(solution: GaitSolution) -> None:
         monkeypatch.setattr(_Solver, "end", solution, raising=False)
@@ -344,6 +346,22 @@ def test_quiet_prints_nothing(
     result = run("solve", "mapd-orthosis", "mapd-orthosis", "--quiet", "--out", "mine")
     assert (result.exit_code, result.output) == (0, "")
     assert (here / "mine" / "metrics.json").is_file()
+
+
+def test_the_verdict_is_told_and_kept(
+    here: Path,
+    ends: Callable[[GaitSolution], None],
+    made_solution: MadeSolution,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ends(made_solution())
+    monkeypatch.setattr(study_run, "verdict_of", lambda solution: verdict())
+    result = run("solve", "mapd-orthosis", "mapd-orthosis", "--out", "judged")
+    assert "How sure are the springs?" in result.output
+    assert "sits at the upper limit" in result.output
+    kept = load_run(here / "judged").metrics["verdict"]
+    assert kept["springs"][0]["determined"] == "determined"
+    assert "K_P right: 20.0 N m/rad" in (here / "judged" / "log.txt").read_text(encoding="utf-8")
 
 
 def test_a_failed_solve_exits_with_1_and_names_the_worst(

@@ -16,7 +16,7 @@ __all__ = ["FILES", "agreement", "label_of", "sensitivity_lines", "write_sensiti
 
 FILES: Final = ("sensitivity.csv", "sensitivity_check.csv", "sensitivity.json")
 
-_LABEL, _CELL = 36, 9
+_LABEL, _CELL = 41, 9
 """Widths of the columns on the terminal."""
 
 _SHOWN: Final = 1e-3
