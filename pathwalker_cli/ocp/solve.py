@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from pathwalker_cli.config import StudyConfig, study_patient
-from pathwalker_cli.conventions import COORDINATES, STIFFNESSES
+from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp import mesh as meshing
@@ -150,8 +150,7 @@ class GaitSolver:
         """Return the numbers of a stage."""
         friction = self.config.bounds.friction
         shared = self.gait.shared_values(weights, friction, orthosis_share)
-        follows = weights.tracking or self.config.fits
-        reference = self.stride.coordinates if follows else _no_reference
+        reference = self.stride.coordinates
         return ProblemNumbers(shared, table, lambda i, at: reference(i, at), self.samples)
 
     @cached_property
@@ -330,11 +329,6 @@ class GaitSolver:
             stages=tuple(self.stages),
             seconds=dict(self.seconds),
         )
-
-
-def _no_reference(phase: int, fraction: float) -> np.ndarray:
-    """Return what stands in for a stride to follow where none is followed."""
-    return np.zeros(len(COORDINATES))
 
 
 def _within(errors: Reintegration, tolerances: tuple[float, float]) -> bool:
