@@ -16,7 +16,6 @@ from click.testing import CliRunner, Result
 
 from helpers import stylised_series
 from pathwalker_cli.cli import cli
-from pathwalker_cli.commands import solve as solve_module
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperNumber
 from pathwalker_cli.model.walker import build_walker
@@ -31,6 +30,7 @@ from pathwalker_cli.reproduce.inverse_study import inverse_config, inverse_resul
 from pathwalker_cli.reproduce.plan import ORDER, SEVERAL, planned_studies
 from pathwalker_cli.reproduce.results import Results, evaluated
 from pathwalker_cli.reproduce.words import deviation, label, ours_text, printed, subject
+from pathwalker_cli.studies import run as study_run
 
 MadeSolution = Callable[..., GaitSolution]
 
@@ -69,7 +69,8 @@ def _without_solves(made: MadeSolution) -> Iterator[Solver]:
     """Let a stand-in solve; leave out figures and read recordings once, which take the time."""
     stand_in = Solver(made)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(solve_module, "_solve", stand_in)
+        patch.setattr(study_run, "_solve", stand_in)
+        patch.setattr(study_run, "verdict_of", lambda solution: None)
         patch.setattr(run_folder, "save_figures", lambda *_: ())
         patch.setattr(pipeline, "recordings", RECORDINGS)
         patch.setattr(pipeline, "save_paper_figures", lambda *_: (("figure-1.png", "Figure 1"),))
@@ -202,7 +203,7 @@ def test_a_stopped_call_goes_on(
         return solver(study, *rest)
 
     with monkeypatch.context() as patch:
-        patch.setattr(solve_module, "_solve", stopping)
+        patch.setattr(study_run, "_solve", stopping)
         result = reproduce("--quick", "--out", tmp_path / "out")
     assert result.exit_code == 1
     assert "stopped by the user in mapd-barefoot" in result.output
