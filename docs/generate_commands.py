@@ -28,8 +28,8 @@ if it comes with PathWalker, by its name alone (`mapd-orthosis`); its keys are i
 
 | exit code | meaning |
 | --- | --- |
-| 0 | done; of `solve`, `batch` and `reproduce`: converged; of `doctor`: ready |
-| {not_converged} | `solve`, `batch`, `reproduce`: not converged; `doctor`: something is missing |
+| 0 | done; of `solve`, `reproduce` and all studies: converged; of `doctor`: ready |
+| {not_converged} | `solve`, `reproduce`, studies: something did not converge; `doctor`: something is missing |
 | {refused} | bad input: one sentence on stderr says what, where and how to mend it |
 | {stopped} | Ctrl-C before there was anything to keep |
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pathwalker_cli.config import load_config, study_patient
+from pathwalker_cli.config import load_config, study_patient, with_values
 from pathwalker_cli.errors import ConfigError, PatientError
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -13,7 +13,6 @@ from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.mesh import uniform
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.studies.base import with_values
 from pathwalker_cli.variation import Variation, varied
 
 PATIENT = load_patient("sreenivasa2017-patient")

@@ -21,10 +21,7 @@ from pathwalker_cli.ocp.resolve import Resolver
 from pathwalker_cli.output.run_folder import Run, load_run
 from pathwalker_cli.studies.run import RunLog, is_done, run_study
 
-__all__ = ["NeighbourStudy", "base_run", "check_folder", "load_study", "resolver_of", "with_values"]
-
-BASE = "base"
-"""Folder of the run that a study begins with, in the study's own folder."""
+__all__ = ["NeighbourStudy", "base_run", "check_folder", "load_study", "resolver_of"]
 
 
 class NeighbourStudy(YamlModel):
