@@ -29,7 +29,7 @@ if it comes with PathWalker, by its name alone (`mapd-orthosis`); its keys are i
 | exit code | meaning |
 | --- | --- |
 | 0 | done; of `solve`, `reproduce` and all studies: converged; of `doctor`: ready |
-| {not_converged} | `solve`, `reproduce`, studies: not all converged; `doctor`: something is missing |
+| {not_converged} | `solve`, `reproduce`, studies: not converged; `doctor`: something is missing |
 | {refused} | bad input: one sentence on stderr says what, where and how to mend it |
 | {stopped} | Ctrl-C before there was anything to keep |
 
