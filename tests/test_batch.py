@@ -663,12 +663,16 @@ def test_workers_end_with_their_parent(tmp_path: Path, number: signal.Signals) -
     command = [sys.executable, script, tmp_path]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment,
                           start_new_session=True) as parent:  # fmt: skip
-        workers = awaited(lambda: busy(parent.pid))
-        if number == signal.SIGINT:
-            os.killpg(parent.pid, number)
-        else:
-            parent.send_signal(number)
-        output, _ = parent.communicate(timeout=20)
+        try:
+            workers = awaited(lambda: busy(parent.pid))
+            if number == signal.SIGINT:
+                os.killpg(parent.pid, number)
+            else:
+                parent.send_signal(number)
+            output, _ = parent.communicate(timeout=20)
+        except BaseException:
+            os.killpg(parent.pid, signal.SIGKILL)
+            raise
     assert output == ("stopped\n" if number == signal.SIGINT else "")
     awaited(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers))
 

@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from typing import Final
 
 from pebble import ProcessExpired, ProcessPool
@@ -80,13 +81,15 @@ class LocalPool:
                     else:
                         yield name, result
         finally:
-            pool.stop()
-            pool.join()
+            with _deaf():
+                pool.stop()
+                pool.join()
         lost |= dict.fromkeys([*running.values(), *(task.name for task in waiting)], NO_WORKERS)
 
     def _submit(self, pool: ProcessPool, task: Task, work: Work) -> Future[Result]:
         arguments = (task.config, task.folder, task.warm_start)
-        return pool.schedule(work, args=arguments, timeout=self._time_limit)
+        with _deaf():
+            return pool.schedule(work, args=arguments, timeout=self._time_limit)
 
     def _result(self, future: Future[Result]) -> Result:
         """Return what a worker handed back.
@@ -113,6 +116,16 @@ def _death(error: ProcessExpired | BrokenProcessPool) -> str:
     if code >= 0:
         return f"the worker ended with exit code {code}"
     return f"the worker was ended by {signal.Signals(-code).name}; did memory run out?"
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Put Ctrl-C off: within the pool it could leave a lock held, and the pool never end."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepare() -> None:
