@@ -636,6 +636,7 @@ def test_two_processes_in_one_folder_are_refused(tmp_path: Path) -> None:
 
 
 HANGING = """
+import signal
 import sys
 from pathlib import Path
 from fake_work import die, fake_work
@@ -648,6 +649,8 @@ def work():
     for _ in LocalPool(2).run(tasks, fake_work): pass
 
 if __name__ == "__main__":
+    # shells start background jobs deaf to Ctrl-C
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         work()
     except KeyboardInterrupt:
