@@ -124,14 +124,17 @@ class KktSystem:
         return int((gone | come).sum())
 
     def answer(self, below: CollocationProgram, above: CollocationProgram, step: float) -> Answer:
-        """Return the derivatives by a number of the problem, free parameters held.
+        """Return the derivatives by a number of the problem; free parameters follow it.
 
         Args:
             below: The same program with the number one step lower.
             above: The same program with the number one step higher.
             step: Half the distance between the two.
         """
-        return self._answer(self._change(below, above, step))
+        change = self._change(below, above, step)
+        answer = self._answer(change)
+        pull = self._pull(answer) + change.gradient[self.free]
+        return self._followed(answer, pull, list(range(len(self.free))))
 
     @cached_property
     def parameter_answers(self) -> tuple[Answer, ...]:
@@ -152,41 +155,32 @@ class KktSystem:
         matrix = np.array(columns).reshape(len(self.free), len(self.free))
         return (matrix + matrix.T) / 2.0
 
-    def with_parameters(
-        self, answer: Answer, change: tuple[CollocationProgram, CollocationProgram, float]
-    ) -> tuple[Answer, np.ndarray]:
-        """Return an answer in which the free parameters follow too, and how they follow.
-
-        Args:
-            answer: What `answer` returned.
-            change: The arguments that it was called with.
-        """
-        pull = self._pull(answer) + self._change(*change).gradient[self.free]
-        matrix = self.parameter_hessian + np.diag(self._bound_ratio[self.free])
-        follow = -np.linalg.solve(matrix, pull) if len(self.free) else np.zeros(0)
-        for own, amount in zip(self.parameter_answers, follow, strict=True):
-            answer = answer.plus(own, float(amount))
-        return answer, follow
-
     def held(self, which: int) -> Answer:
         """Return the derivatives by one free parameter (scaled) while the others follow."""
-        others = [i for i in range(len(self.free)) if i != which]
-        matrix = self.parameter_hessian + np.diag(self._bound_ratio[self.free])
-        answer = self.parameter_answers[which]
-        follow = -np.linalg.solve(matrix[np.ix_(others, others)], matrix[others, which])
-        for i, amount in zip(others, follow, strict=True):
-            answer = answer.plus(self.parameter_answers[i], float(amount))
-        return answer
+        others = self._others(which)
+        pull = self.parameter_hessian[others, which]
+        return self._followed(self.parameter_answers[which], pull, others)
 
     def curvature(self, which: int) -> float:
         """Return the second derivative of the cost in one free parameter while others follow."""
-        others = [i for i in range(len(self.free)) if i != which]
-        full = self.parameter_hessian
-        held = full + np.diag(self._bound_ratio[self.free])
-        coupling = full[others, which]
-        return float(
-            full[which, which] - coupling @ np.linalg.solve(held[np.ix_(others, others)], coupling)
-        )
+        others = self._others(which)
+        coupling = self.parameter_hessian[others, which]
+        follow = self._follow(coupling, others)
+        return float(self.parameter_hessian[which, which] + coupling @ follow)
+
+    def _others(self, which: int) -> list[int]:
+        return [i for i in range(len(self.free)) if i != which]
+
+    def _follow(self, pull: np.ndarray, which: list[int]) -> np.ndarray:
+        """Return how some free parameters follow a pull on them, their bounds in the way."""
+        matrix = self.parameter_hessian + np.diag(self._bound_ratio[self.free])
+        return -np.linalg.solve(matrix[np.ix_(which, which)], pull)
+
+    def _followed(self, answer: Answer, pull: np.ndarray, which: list[int]) -> Answer:
+        """Return an answer in which some free parameters follow."""
+        for i, amount in zip(which, self._follow(pull, which), strict=True):
+            answer = answer.plus(self.parameter_answers[i], float(amount))
+        return answer
 
     @cached_property
     def parameter_gradient(self) -> np.ndarray:

@@ -93,26 +93,19 @@ class Neighbourhood:
         step = _STEP * float(self.optimum.stiffness[STIFFNESSES.index(spring)])
         return self._derivative(held, 1.0 / self._scale[which], step, {})
 
-    def by_values(self, change: Mapping[str, Any], less: Mapping[str, Any]) -> Derivative:
-        """Return the derivatives by a number of the config, the springs following.
+    def by_factor(self, place: str) -> Derivative:
+        """Return the derivatives by a factor on a place in the patient's file, the springs follow.
 
         Args:
-            change: Config values by dotted key with the number one step higher.
-            less: The same one step lower; steps are relative ones of 1e-4.
+            place: The place; what the config scales there already is scaled on.
         """
-        above, below = (self._moved(values) for values in (change, less))
-        pair = below.program, above.program, _STEP
-        answer, _ = self.kkt.with_parameters(self.kkt.answer(*pair), pair)
-        return self._derivative(answer, 1.0, _STEP, {1: above, -1: below})
-
-    def by_factor(self, place: str) -> Derivative:
-        """Return the derivatives by a factor on a place in the patient's file, at 1."""
-        variation = self.optimum.config.variation.model_dump()
-        low, high = (
-            {**variation["scale"], place: variation["scale"].get(place, 1.0) * factor}
+        scale = self.optimum.config.variation.scale
+        below, above = (
+            self._moved({"variation.scale": {**scale, place: scale.get(place, 1.0) * factor}})
             for factor in (1.0 - _STEP, 1.0 + _STEP)
         )
-        return self.by_values({"variation.scale": high}, {"variation.scale": low})
+        answer = self.kkt.answer(below.program, above.program, _STEP)
+        return self._derivative(answer, 1.0, _STEP, {1: above, -1: below})
 
     def changed_activity(self, other: Optimum) -> int:
         """Return how many inequalities are clearly active in one optimum, clearly not in the other.

@@ -161,7 +161,7 @@ def verdict_of(solution: GaitSolution) -> Verdict | None:
         (where both sides are one), or a solution that is not one.
     """
     config = solution.config
-    if not solution.converged or solution.config.condition != "orthosis":
+    if not solution.converged or config.condition != "orthosis":
         return None
     if config.half_cycle or config.transcription != "collocation":
         return None
@@ -262,9 +262,9 @@ class _Judge:
         springs = {name: spring.stiffness for name, spring in zip(names, best, strict=True)}
         found = self._solved(springs)
         self.solves += 1
-        rise = (found.cost if found.converged else self._estimate(best, stiffness)) - (
-            self.optimum.cost if found.converged else 0.0
-        )
+        rise = self._estimate(best, stiffness)
+        if found.converged:
+            rise = found.cost - self.optimum.cost
         series = found.series
         return SnappedSprings(
             {name: spring.name for name, spring in zip(names, best, strict=True)},
