@@ -23,10 +23,10 @@ from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematic
 from pathwalker_cli.io.fields import Quantity
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.studies.batch.schema import BatchStudy
-from pathwalker_cli.studies.landscape_study import LandscapeStudy
-from pathwalker_cli.studies.perturbation import PerturbationStudy
-from pathwalker_cli.studies.tradeoff import TradeoffStudy
-from pathwalker_cli.studies.uncertainty import UncertaintyStudy
+from pathwalker_cli.studies.landscape.study import LandscapeStudy
+from pathwalker_cli.studies.perturbation.study import PerturbationStudy
+from pathwalker_cli.studies.tradeoff.study import TradeoffStudy
+from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy
 
 PAGE: Final = Path(__file__).with_name("configuration.md")
 CONFIGS: Final = PAGE.parent.parent / "configs"

@@ -46,11 +46,11 @@ CONFINED = {
         "evaluation.figures",
         "reproduce.figures",
         "reproduce.muscle_figures",
-        "studies.landscape_figures",
-        "studies.sensitivity_figures",
-        "studies.perturbation_figures",
-        "studies.tradeoff_figures",
-        "studies.uncertainty_figures",
+        "studies.landscape.figures",
+        "studies.sensitivity.figures",
+        "studies.perturbation.figures",
+        "studies.tradeoff.figures",
+        "studies.uncertainty.figures",
     ),
     "click": ("cli", "commands"),
     "rich": ("commands", "output"),
@@ -59,7 +59,7 @@ CONFINED = {
     "distributed": ("studies.batch.cluster",),
     "ezc3d": ("io",),
     "pebble": ("studies.batch.local",),
-    "yaml": ("io", "config", "output.run_folder"),
+    "yaml": ("io", "output.run_folder"),
 }
 """Libraries and the parts of the package that may import them."""
 

@@ -21,15 +21,15 @@ from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.output.run_folder import write_run
-from pathwalker_cli.studies import landscape as module
 from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies.base import load_study
-from pathwalker_cli.studies.landscape import grid, landscape_of, with_springs
-from pathwalker_cli.studies.landscape_figures import landscape_figure
-from pathwalker_cli.studies.landscape_files import ENTRIES, write_landscape
-from pathwalker_cli.studies.landscape_result import Landscape, region_of
-from pathwalker_cli.studies.landscape_study import Axis, LandscapeStudy, axis_values
-from pathwalker_cli.studies.landscape_text import landscape_lines
+from pathwalker_cli.studies.landscape import solve as module
+from pathwalker_cli.studies.landscape.figures import landscape_figure
+from pathwalker_cli.studies.landscape.files import ENTRIES, write_landscape
+from pathwalker_cli.studies.landscape.result import Landscape, region_of
+from pathwalker_cli.studies.landscape.solve import grid, landscape_of, with_springs
+from pathwalker_cli.studies.landscape.study import Axis, LandscapeStudy, axis_values
+from pathwalker_cli.studies.landscape.text import landscape_lines
 
 COARSE = ("dorsiflexion.points=4", "plantarflexion=[5, 20, 80]")
 
@@ -242,6 +242,12 @@ def test_files(made: Make, tmp_path: Path) -> None:
     assert summary["grid_points"] == 12
     for extension in ("png", "svg"):
         assert (tmp_path / "out" / "figures" / f"landscape.{extension}").stat().st_size > 10_000
+
+
+def test_what_cannot_be_integrated_is_null_in_the_summary(made: Make, tmp_path: Path) -> None:
+    write_landscape(tmp_path, made(errors=(5e-4, np.inf))[0])
+    checks = json.loads((tmp_path / "landscape.json").read_text(encoding="utf-8"))["reintegration"]
+    assert {(check["position"], check["velocity"]) for check in checks.values()} == {(5e-4, None)}
 
 
 def test_the_figure_marks_what_is_there(made: Make) -> None:

@@ -17,6 +17,7 @@ from helpers import ACTIVATION, FRICTION, GAIT, STIFFNESS, stylised_series
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, SIDES
 from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.io.atomic import atomic_open, atomic_path
+from pathwalker_cli.io.json_file import json_text, write_json
 from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.model.walker import ANKLES
 from pathwalker_cli.ocp.phased import PhasedMotion
@@ -231,6 +232,13 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError), atomic_path(path):
         pass
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_json_has_no_numbers_that_are_none(tmp_path: Path) -> None:
+    assert json_text({"Länge": [0.5, None]}) == '{\n  "Länge": [\n    0.5,\n    null\n  ]\n}\n'
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_json(tmp_path / "file.json", {"length": float("nan")})
+    assert list(tmp_path.iterdir()) == []
 
 
 def reference(series: GaitSeries) -> Reference:

@@ -5,27 +5,33 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from neighbours_stand_in import BEST, StandInResolver, stand_in_measures
+from conftest import made_result
+from made_neighbours import made_run
+from neighbours_stand_in import BEST, StandInOptimum, StandInResolver, stand_in_measures
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config, with_values
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output import run_folder
 from pathwalker_cli.output.run_folder import write_run
-from pathwalker_cli.studies import perturbation as module
-from pathwalker_cli.studies.base import base_run, load_study
+from pathwalker_cli.studies.base import base_run, load_study, require_optimum
+from pathwalker_cli.studies.journal import Journal
 from pathwalker_cli.studies.measures import COMPARED
-from pathwalker_cli.studies.perturbation import PerturbationStudy, perturb
-from pathwalker_cli.studies.perturbation_result import remark
-from pathwalker_cli.studies.perturbation_text import perturbation_lines
+from pathwalker_cli.studies.perturbation import study as module
+from pathwalker_cli.studies.perturbation.result import remark
+from pathwalker_cli.studies.perturbation.study import PerturbationStudy, perturb
+from pathwalker_cli.studies.perturbation.text import perturbation_lines
 
 MadeSolution = Callable[..., GaitSolution]
 
@@ -258,6 +264,29 @@ def test_a_folder_with_something_else_is_refused(
     result = call()
     assert result.exit_code == 2
     assert "thesis.txt" in result.output
+
+
+def test_an_optimum_that_cannot_be_solved_again_is_refused(tmp_path: Path) -> None:
+    run = made_run(tmp_path)
+    failed = replace(made_result(), status="the iteration limit was reached")
+    resolver: Any = SimpleNamespace(optimum=StandInOptimum(run.config, failed))
+    with pytest.raises(NotConvergedError, match="a tolerance of 1e-08: the iteration limit"):
+        require_optimum(resolver, run, 1e-8)
+
+
+def test_what_was_solved_before_needs_no_optimum(tmp_path: Path) -> None:
+    run = made_run(tmp_path)
+
+    class Unasked(StandInResolver):
+        @property
+        def optimum(self) -> StandInOptimum:
+            raise AssertionError("the optimum is solved")
+
+    for solved in (1, 0):
+        resolver: Any = Unasked(run.config)
+        journal = Journal(tmp_path / "points", run, resolver)
+        assert journal.resolve("softer", run.config).converged
+        assert (journal.solved, len(resolver.solved)) == (solved, solved)
 
 
 @pytest.mark.slow

@@ -12,14 +12,10 @@ from click.testing import CliRunner
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.studies.sensitivity import (
-    Check,
-    Sensitivities,
-    Sensitivity,
-    default_places,
-)
-from pathwalker_cli.studies.sensitivity_figures import save_sensitivity_figure
-from pathwalker_cli.studies.sensitivity_text import (
+from pathwalker_cli.studies.sensitivity.figures import save_sensitivity_figure
+from pathwalker_cli.studies.sensitivity.result import Check, Sensitivities, Sensitivity
+from pathwalker_cli.studies.sensitivity.study import default_places
+from pathwalker_cli.studies.sensitivity.text import (
     agreement,
     label_of,
     sensitivity_lines,

@@ -21,14 +21,14 @@ from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.studies import neighbours
-from pathwalker_cli.studies import tradeoff as module
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.run import RunLog
-from pathwalker_cli.studies.tradeoff import TradeoffStudy, chain, tradeoff_of
-from pathwalker_cli.studies.tradeoff_figures import labels, tradeoff_figure
-from pathwalker_cli.studies.tradeoff_files import ENTRIES, write_tradeoff
-from pathwalker_cli.studies.tradeoff_result import FrontPoint, Tradeoff
-from pathwalker_cli.studies.tradeoff_text import tradeoff_lines
+from pathwalker_cli.studies.tradeoff import study as module
+from pathwalker_cli.studies.tradeoff.figures import labels, tradeoff_figure
+from pathwalker_cli.studies.tradeoff.files import ENTRIES, write_tradeoff
+from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
+from pathwalker_cli.studies.tradeoff.study import TradeoffStudy, chain, tradeoff_of
+from pathwalker_cli.studies.tradeoff.text import tradeoff_lines
 
 FOUR = ("walking_speed_weights=[0, 0.5, 1, 2]",)
 ROUGH = (5e-3, 5e-2)

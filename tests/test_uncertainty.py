@@ -22,11 +22,11 @@ from pathwalker_cli.output import run_folder
 from pathwalker_cli.output.run_folder import write_run
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.studies import pool
-from pathwalker_cli.studies import uncertainty as module
 from pathwalker_cli.studies.base import base_run, load_study
-from pathwalker_cli.studies.draws import Distribution, Draws, Input, draw, inputs_of
-from pathwalker_cli.studies.uncertainty import UncertaintyStudy, draw_configs, uncertainty
-from pathwalker_cli.studies.uncertainty_result import chance_level, rank_correlations, spreads
+from pathwalker_cli.studies.uncertainty import study as module
+from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input, draw, inputs_of
+from pathwalker_cli.studies.uncertainty.result import chance_level, rank_correlations, spreads
+from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, draw_configs, uncertainty
 
 MadeSolution = Callable[..., GaitSolution]
 PATIENT = load_patient("sreenivasa2017-patient")

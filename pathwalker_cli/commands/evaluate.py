@@ -37,7 +37,8 @@ def evaluate_command(
     other. Recordings are those beside the patient's file. A run that did not converge is refused.
     """
     from pathwalker_cli.evaluation.evaluate import evaluate_gait
-    from pathwalker_cli.evaluation.files import evaluation_content, json_text
+    from pathwalker_cli.evaluation.files import evaluation_content
+    from pathwalker_cli.io.json_file import json_text
 
     gaits = _gaits(runs)
     trials = _trials(gaits, trial)
@@ -107,11 +108,12 @@ def _changes(evaluations: Sequence[Evaluation]) -> tuple[Change, ...]:
 def _write(out: Path, evaluations: Sequence[Evaluation], content: dict[str, Any]) -> None:
     """Write tables and figures, all or none."""
     from pathwalker_cli.evaluation.figures import save_evaluation_figures
-    from pathwalker_cli.evaluation.files import json_text, write_csv
+    from pathwalker_cli.evaluation.files import write_csv
+    from pathwalker_cli.io.json_file import write_json
     from pathwalker_cli.output.recorded_files import staged_folder
 
     with staged_folder(out) as folder:
-        (folder / "evaluation.json").write_text(json_text(content), encoding="utf-8")
+        write_json(folder / "evaluation.json", content)
         write_csv(folder / "evaluation.csv", evaluations)
         for each in evaluations:
             figures = folder / "figures"

@@ -24,10 +24,10 @@ def landscape_command(
     base did not converge or Ctrl-C, 2 bad input.
     """
     from pathwalker_cli.studies.base import check_folder, load_study
-    from pathwalker_cli.studies.landscape import landscape_of
-    from pathwalker_cli.studies.landscape_files import ENTRIES, write_landscape
-    from pathwalker_cli.studies.landscape_study import LandscapeStudy
-    from pathwalker_cli.studies.landscape_text import landscape_lines
+    from pathwalker_cli.studies.landscape.files import ENTRIES, write_landscape
+    from pathwalker_cli.studies.landscape.solve import landscape_of
+    from pathwalker_cli.studies.landscape.study import LandscapeStudy
+    from pathwalker_cli.studies.landscape.text import landscape_lines
 
     study = load_study(config, LandscapeStudy, changes)
     check_folder(out, ENTRIES, "landscape")

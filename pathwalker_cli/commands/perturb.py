@@ -33,9 +33,9 @@ def perturb_command(
     """
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.studies.base import check_folder, load_study
-    from pathwalker_cli.studies.perturbation import PerturbationStudy, perturb
-    from pathwalker_cli.studies.perturbation_figures import save_perturbation_figure
-    from pathwalker_cli.studies.perturbation_text import perturbation_lines, write_perturbation
+    from pathwalker_cli.studies.perturbation.figures import save_perturbation_figure
+    from pathwalker_cli.studies.perturbation.study import PerturbationStudy, perturb
+    from pathwalker_cli.studies.perturbation.text import perturbation_lines, write_perturbation
 
     study = load_study(config, PerturbationStudy, changes)
     check_folder(out, ENTRIES, "perturb")

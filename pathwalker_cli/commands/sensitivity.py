@@ -24,9 +24,9 @@ def sensitivity_command(
     input.
     """
     from pathwalker_cli.studies.base import check_folder, load_study
-    from pathwalker_cli.studies.sensitivity import SensitivityStudy, sensitivities
-    from pathwalker_cli.studies.sensitivity_figures import save_sensitivity_figure
-    from pathwalker_cli.studies.sensitivity_text import (
+    from pathwalker_cli.studies.sensitivity.figures import save_sensitivity_figure
+    from pathwalker_cli.studies.sensitivity.study import SensitivityStudy, sensitivities
+    from pathwalker_cli.studies.sensitivity.text import (
         FILES,
         sensitivity_lines,
         write_sensitivities,

@@ -26,9 +26,9 @@ def tradeoff_command(
     """
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.studies.base import check_folder, load_study
-    from pathwalker_cli.studies.tradeoff import TradeoffStudy, tradeoff_of
-    from pathwalker_cli.studies.tradeoff_files import ENTRIES, write_tradeoff
-    from pathwalker_cli.studies.tradeoff_text import tradeoff_lines
+    from pathwalker_cli.studies.tradeoff.files import ENTRIES, write_tradeoff
+    from pathwalker_cli.studies.tradeoff.study import TradeoffStudy, tradeoff_of
+    from pathwalker_cli.studies.tradeoff.text import tradeoff_lines
 
     study = load_study(config, TradeoffStudy, changes)
     check_folder(out, ENTRIES, "tradeoff")

@@ -52,9 +52,9 @@ def uncertainty_command(
     from pathwalker_cli.commands.perturb import base_with_springs
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.studies.base import check_folder, load_study
-    from pathwalker_cli.studies.uncertainty import UncertaintyStudy, uncertainty
-    from pathwalker_cli.studies.uncertainty_figures import save_uncertainty_figures
-    from pathwalker_cli.studies.uncertainty_text import uncertainty_lines, write_uncertainty
+    from pathwalker_cli.studies.uncertainty.figures import save_uncertainty_figures
+    from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, uncertainty
+    from pathwalker_cli.studies.uncertainty.text import uncertainty_lines, write_uncertainty
 
     study = load_study(config, UncertaintyStudy, changes)
     check_folder(out, ENTRIES, "uncertainty")

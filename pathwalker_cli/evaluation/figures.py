@@ -18,7 +18,7 @@ from pathwalker_cli.evaluation.evaluate import Evaluation
 from pathwalker_cli.inverse.bands import POINTS, resampled
 from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.output.figures.curves import CLINICAL_ANGLE, Band
-from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.save import save_formats
 from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
@@ -141,20 +141,16 @@ def save_evaluation_figures(evaluation: Evaluation, folder: str | Path) -> tuple
         evaluation: The gait beside the recordings.
         folder: Where; made if it does not exist.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     makers = {"joint_angles": joint_angle_figure}
     if evaluation.gait.force is not None:
         makers["ground_forces"] = ground_force_figure
     if evaluation.gait.net_torque is not None:
         makers["ankle_torque"] = ankle_figure
-    saved = []
+    saved: list[str] = []
     for name, make in makers.items():
         with mpl.rc_context(STYLE):
             figure = make(evaluation)
-        for extension in ("png", "svg"):
-            saved.append(f"{name}.{extension}")
-            save_figure(figure, folder / saved[-1])
+        saved += save_formats(figure, folder, name)
     return tuple(saved)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -13,7 +12,7 @@ from pathwalker_cli.evaluation.paper import PaperClaim, PaperNumber
 from pathwalker_cli.evaluation.spread import Spread
 from pathwalker_cli.io.atomic import atomic_open
 
-__all__ = ["evaluation_content", "json_text", "write_csv"]
+__all__ = ["evaluation_content", "write_csv"]
 
 _COLUMNS: Final = (
     "run",
@@ -42,11 +41,6 @@ def evaluation_content(
         "runs": [_run(each) for each in evaluations],
         "changes": {change.quantity.key: _change(change) for change in changes},
     }
-
-
-def json_text(content: dict[str, Any]) -> str:
-    """Return the content of `evaluation_content` as JSON."""
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_csv(path: str | Path, evaluations: Iterable[Evaluation]) -> None:

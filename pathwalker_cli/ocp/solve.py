@@ -11,7 +11,6 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -26,7 +25,7 @@ from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers, Sample
 from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
 from pathwalker_cli.ocp.start import ReferenceStride, reference_stride, start_recording
 from pathwalker_cli.ocp.structures import gait_blocks
-from pathwalker_cli.ocp.symmetry import asymmetries, full_stride
+from pathwalker_cli.ocp.symmetry import full_stride, require_symmetry
 from pathwalker_cli.ocp.verify import (
     Reintegration,
     active_bounds,
@@ -92,14 +91,7 @@ class GaitSolver:
             return "passage"
         if not self.config.half_cycle:
             return "stride"
-        differing = asymmetries(self.walker)
-        if differing:
-            raise ConfigError(
-                f"asks for half a cycle, but {', '.join(differing)} differ between the sides of "
-                f"{self.walker.patient.id}",
-                where="half_cycle",
-                mend="set half_cycle to false",
-            )
+        require_symmetry(self.walker)
         return "step"
 
     @property

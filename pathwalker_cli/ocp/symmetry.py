@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, mirror_permutation, mirrored
+from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.cost_terms import walked_distance
@@ -18,7 +19,7 @@ from pathwalker_cli.ocp.gait import (
 )
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
-__all__ = ["asymmetries", "full_stride"]
+__all__ = ["asymmetries", "full_stride", "require_symmetry"]
 
 
 def asymmetries(walker: Walker) -> list[str]:
@@ -39,6 +40,22 @@ def asymmetries(walker: Walker) -> list[str]:
         "orthoses": walker.orthosis is not None and walker.orthosis[0] != walker.orthosis[1],
     }
     return [name for name, differs in differing.items() if differs]
+
+
+def require_symmetry(walker: Walker) -> None:
+    """Refuse half a cycle of a walker whose sides differ.
+
+    Raises:
+        ConfigError: If they do.
+    """
+    differing = asymmetries(walker)
+    if differing:
+        raise ConfigError(
+            f"asks for half a cycle, but {', '.join(differing)} differ between the sides of "
+            f"{walker.patient.id}",
+            where="half_cycle",
+            mend="set half_cycle to false",
+        )
 
 
 def full_stride(step: PhasedMotion) -> PhasedMotion:

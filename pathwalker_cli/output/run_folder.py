@@ -18,6 +18,7 @@ import yaml
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.ocp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries
@@ -115,8 +116,7 @@ def write_run(
         _write_series(staging, solution.last_iterate)
         if not solution.converged:
             (staging / _SEAL).write_text(_seal(solution), encoding="utf-8")
-        shown = json.dumps(metrics, indent=2, ensure_ascii=False, allow_nan=False)
-        (staging / _METRICS).write_text(shown + "\n", encoding="utf-8")
+        write_json(staging / _METRICS, metrics)
     return metrics
 
 

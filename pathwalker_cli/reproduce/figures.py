@@ -15,7 +15,7 @@ from pathwalker_cli.evaluation.evaluate import Evaluation
 from pathwalker_cli.evaluation.figures import ankle_figure, ground_force_figure, joint_angle_figure
 from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.output.figures import orthosis_curves
-from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.save import save_formats
 from pathwalker_cli.output.figures.style import STYLE
 from pathwalker_cli.reproduce.muscle_figures import (
     activation_figure,
@@ -58,13 +58,11 @@ def save_paper_figures(results: Results, folder: Path) -> tuple[tuple[str, str],
     Returns:
         PNG file name and caption of every figure.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     saved = []
     for plan in _plans(results):
         with mpl.rc_context(STYLE):
             figure = plan.make()
-        for extension in ("png", "svg"):
-            save_figure(figure, folder / f"{plan.name}.{extension}")
+        save_formats(figure, folder, plan.name)
         saved.append((f"{plan.name}.png", plan.caption))
     return tuple(saved)
 

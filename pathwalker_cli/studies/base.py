@@ -17,11 +17,18 @@ from pathwalker_cli.config import (
 from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
 from pathwalker_cli.io.fields import YamlModel
 from pathwalker_cli.io.yaml_file import read_mapping, validate
-from pathwalker_cli.ocp.resolve import Resolver
+from pathwalker_cli.ocp.resolve import Optimum, Resolver
 from pathwalker_cli.output.run_folder import Run, load_run
 from pathwalker_cli.studies.run import RunLog, is_done, run_study
 
-__all__ = ["NeighbourStudy", "base_run", "check_folder", "load_study", "resolver_of"]
+__all__ = [
+    "NeighbourStudy",
+    "base_run",
+    "check_folder",
+    "load_study",
+    "require_optimum",
+    "resolver_of",
+]
 
 
 class NeighbourStudy(YamlModel):
@@ -91,6 +98,26 @@ def base_run(study: StudyConfig, folder: Path, log: RunLog | None = None) -> Run
 def resolver_of(run: Run, tolerance: float | None = None) -> Resolver:
     """Return a solver of the neighbours of a run."""
     return Resolver(run.config, run.motion, run.multipliers, tolerance)
+
+
+def require_optimum(resolver: Resolver, run: Run, tolerance: float) -> Optimum:
+    """Return the optimum around which a resolver solves neighbours.
+
+    Args:
+        resolver: The solver of neighbours of the run.
+        run: The run, for the message.
+        tolerance: Optimality tolerance of the solves, for the message.
+
+    Raises:
+        NotConvergedError: If the optimum cannot be solved to the tolerance.
+    """
+    optimum = resolver.optimum
+    if not optimum.converged:
+        raise NotConvergedError(
+            f"the optimum in {run.folder} could not be solved to a tolerance of {tolerance:g}: "
+            f"{optimum.result.status}"
+        )
+    return optimum
 
 
 def check_folder(folder: Path, entries: frozenset[str], command: str) -> None:

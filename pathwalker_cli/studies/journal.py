@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult
@@ -17,7 +17,10 @@ from pathwalker_cli.output.motion_file import read_arrays
 from pathwalker_cli.output.run_folder import Run, config_text
 from pathwalker_cli.output.run_metrics import sha256
 
-__all__ = ["Journal"]
+__all__ = ["STOPPED", "Journal"]
+
+STOPPED: Final = "stopped by the user; the same command goes on from there"
+"""Why nothing further is solved."""
 
 _NUMBERS: Final = ("objective", "iterations", "seconds", "seconds_functions")
 
@@ -34,7 +37,7 @@ class Journal:
     def __init__(self, folder: Path, run: Run, resolver: Resolver) -> None:
         self.folder = folder
         self.resolver = resolver
-        patient = sha256(resolver.optimum.solver.walker.patient.content)
+        patient = sha256(study_patient(run.config).content)
         self._origin = f"{run.metrics['motion_hash']} {patient}"
         self.solved = 0
         """Neighbours that were solved by this journal, not read."""
@@ -58,7 +61,7 @@ class Journal:
         optimum = self.resolver.resolve(config, start)
         self.solved += 1
         if optimum.result.status == "stopped by the user":
-            raise NotConvergedError("stopped by the user; the same command goes on from there")
+            raise NotConvergedError(STOPPED)
         _write(path, seal, optimum.result)
         return optimum
 

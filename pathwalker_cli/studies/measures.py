@@ -41,6 +41,11 @@ class Measure:
     short: str
 
     @property
+    def column(self) -> str:
+        """Heading of its column in files, e.g. "stride_time [s]"."""
+        return f"{self.key} [{self.unit}]"
+
+    @property
     def shown_unit(self) -> str:
         """Unit for people: degrees for angles."""
         return "deg" if self.unit == "rad" else self.unit

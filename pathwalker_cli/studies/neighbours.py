@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from pathwalker_cli.config import StudyConfig, with_values
-from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.ocp.cost_terms import walked_distance
 from pathwalker_cli.ocp.resolve import Optimum
 from pathwalker_cli.output.run_folder import Run
-from pathwalker_cli.studies.base import resolver_of
+from pathwalker_cli.studies.base import require_optimum, resolver_of
 from pathwalker_cli.studies.graph import Solve, Values
 from pathwalker_cli.studies.journal import Journal
 
@@ -43,12 +44,8 @@ class Neighbours:
         limited = with_values(run.config, {"solver.max_iterations": max_iterations})
         resolver = resolver_of(Run(run.folder, run.metrics, run.motion, limited, run.multipliers))
         self._journal = Journal(folder, run, resolver)
-        self.optimum: Optimum = resolver.optimum
+        self.optimum = require_optimum(resolver, run, limited.solver.tolerance)
         """The run as an optimum, solved to its tolerance."""
-        if not self.optimum.converged:
-            raise NotConvergedError(
-                f"the run in {run.folder} could not be solved again: {self.optimum.result.status}"
-            )
         self._count = 0
 
     def resolve(self, name: str, config: StudyConfig, start: Optimum | None) -> Optimum:
@@ -81,5 +78,4 @@ def motion_distance(one: Optimum, other: Optimum) -> float:
 def motion_signature(optimum: Optimum) -> np.ndarray:
     """Return speed [m/s] and stiffnesses [N m/rad] of a solution, by which optima differ."""
     motion = optimum.motion
-    distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
-    return np.array([distance / motion.duration, *motion.parameters])
+    return np.array([walked_distance(motion) / motion.duration, *motion.parameters])

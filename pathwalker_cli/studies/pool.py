@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
-from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Final
 
@@ -18,8 +15,9 @@ from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.output.run_folder import load_run
 from pathwalker_cli.studies.base import resolver_of
-from pathwalker_cli.studies.journal import Journal
+from pathwalker_cli.studies.journal import STOPPED, Journal
 from pathwalker_cli.studies.measures import measures
+from pathwalker_cli.studies.processes import end_with_parent
 
 __all__ = ["Job", "Solved", "for_far_neighbours", "solve_jobs"]
 
@@ -43,8 +41,6 @@ _FAR: Final[dict[str, float | int | str]] = {
 }
 """Options of IPOPT for neighbours that differ in many numbers at once: a quarter fewer iterations
 than without."""
-
-STOPPED: Final = "stopped by the user; the same command goes on from there"
 
 
 @dataclass(frozen=True)
@@ -172,16 +168,8 @@ def _begin(origin: _Origin) -> None:
     """Get a worker process ready."""
     # Ctrl-C reaches workers too: the solver stops by itself, and between solves the parent decides
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        # a killed parent cannot tell its workers: they would wait for work forever
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+    end_with_parent()
     _KEPT[:] = [_journal(origin)]
-
-
-def _end_with(sentinel: int) -> None:
-    wait([sentinel])
-    os._exit(1)
 
 
 def _in_worker(job: Job) -> Solved:

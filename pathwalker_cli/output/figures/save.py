@@ -20,7 +20,10 @@ from pathwalker_cli.output.figures.joint_moments import joint_moments
 from pathwalker_cli.output.figures.stick_figures import stick_figures
 from pathwalker_cli.output.figures.style import STYLE
 
-__all__ = ["FIGURES", "figure_names", "make_figure", "save_figure", "save_figures"]
+__all__ = ["FIGURES", "figure_names", "make_figure", "save_figure", "save_figures", "save_formats"]
+
+FORMATS: Final = ("png", "svg")
+"""What every figure is saved as."""
 
 DPI: Final = 200
 """Dots per inch of the PNG files."""
@@ -65,7 +68,7 @@ def save_figures(
     series: GaitSeries,
     folder: str | Path,
     reference: Reference | None = None,
-    formats: Sequence[str] = ("png", "svg"),
+    formats: Sequence[str] = FORMATS,
 ) -> tuple[str, ...]:
     """Save every figure of a stride and return the file names.
 
@@ -75,15 +78,29 @@ def save_figures(
         reference: Recorded bands to draw behind.
         formats: "png", "svg" or both.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
-    saved = []
-    for name in figure_names(series):
-        figure = make_figure(name, series, reference)
-        for extension in formats:
-            saved.append(f"{name}.{extension}")
-            save_figure(figure, folder / saved[-1])
-    return tuple(saved)
+    return tuple(
+        file
+        for name in figure_names(series)
+        for file in save_formats(make_figure(name, series, reference), folder, name, formats)
+    )
+
+
+def save_formats(
+    figure: Figure, folder: str | Path, name: str, formats: Sequence[str] = FORMATS
+) -> tuple[str, ...]:
+    """Save a figure in several formats and return the file names.
+
+    Args:
+        figure: A figure made under `style.STYLE`.
+        folder: Where; made if it does not exist.
+        name: Name of the files without extension.
+        formats: "png", "svg" or both.
+    """
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    files = tuple(f"{name}.{extension}" for extension in formats)
+    for file in files:
+        save_figure(figure, Path(folder) / file)
+    return files
 
 
 def save_figure(figure: Figure, path: str | Path) -> None:

@@ -17,6 +17,7 @@ from pathwalker_cli.output.cycle import BOTH_SIDES, OwnCycle
 __all__ = [
     "LINE_COLOUR",
     "LINE_STYLE",
+    "MARKER",
     "NEUTRAL",
     "NORMAL",
     "PAGE",
@@ -40,6 +41,8 @@ LINE_COLOUR: Final[dict[Side, str]] = {"right": "#0072B2", "left": "#D55E00"}
 """Blue and vermilion of the palette by Okabe and Ito, told apart with any colour vision."""
 LINE_STYLE: Final[dict[Side, Literal["-", "--"]]] = {"right": "-", "left": "--"}
 """Right solid, left dashed: sides differ without colour too."""
+MARKER: Final[dict[Side, Literal["o", "s"]]] = {"right": "o", "left": "s"}
+"""Right round, left square, for the same reason."""
 NEUTRAL: Final = "#555555"
 """Grey of everything that belongs to no side."""
 

@@ -12,7 +12,7 @@ from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.ocp.gait_bounds import gait_bounds
 from pathwalker_cli.ocp.passage import recorded_passage
 from pathwalker_cli.ocp.start import recorded_stride, start_recording
-from pathwalker_cli.ocp.symmetry import asymmetries
+from pathwalker_cli.ocp.symmetry import require_symmetry
 from pathwalker_cli.output.run_folder import warm_start_run
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.variation import varied
@@ -69,14 +69,8 @@ def _check_start(config: StudyConfig, walker: Walker) -> None:
     Raises:
         InputError: If so.
     """
-    differing = asymmetries(walker) if config.half_cycle else []
-    if differing:
-        raise ConfigError(
-            f"asks for half a cycle, but {', '.join(differing)} differ between the sides of "
-            f"{walker.patient.id}",
-            where="half_cycle",
-            mend="set half_cycle to false",
-        )
+    if config.half_cycle:
+        require_symmetry(walker)
     if config.start.gait == "recorded":
         recording = start_recording(walker, config.start)
         (recorded_passage if config.fits else recorded_stride)(walker, recording)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
-import threading
 from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -17,6 +15,7 @@ from pebble import ProcessExpired, ProcessPool
 
 from pathwalker_cli.ocp.machine import use_one_blas_thread
 from pathwalker_cli.studies.batch.worker import LOST, Result, Task, Work, failure
+from pathwalker_cli.studies.processes import end_with_parent
 
 __all__ = ["LocalPool"]
 
@@ -131,11 +130,4 @@ def _deaf() -> Iterator[None]:
 def _prepare() -> None:
     """Make a worker deaf to Ctrl-C, which is for the parent, and end it with its parent."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    end_with_parent()

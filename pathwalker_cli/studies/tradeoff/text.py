@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.studies.tradeoff_result import FrontPoint, Tradeoff
+from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
 __all__ = ["tradeoff_lines"]
 

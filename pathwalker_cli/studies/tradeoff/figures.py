@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pathwalker_cli.conventions import STIFFNESSES, Side
-from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.save import save_formats
 from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
@@ -25,7 +25,7 @@ from pathwalker_cli.output.figures.style import (
     dress,
     new_figure,
 )
-from pathwalker_cli.studies.tradeoff_result import FrontPoint, Tradeoff
+from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
 __all__ = ["save_tradeoff_figure", "tradeoff_figure"]
 
@@ -63,9 +63,7 @@ def save_tradeoff_figure(folder: Path, tradeoff: Tradeoff) -> None:
         folder: Where.
         tradeoff: The trade-off.
     """
-    figure = tradeoff_figure(tradeoff)
-    for extension in ("png", "svg"):
-        save_figure(figure, folder / f"tradeoff.{extension}")
+    save_formats(tradeoff_figure(tradeoff), folder, "tradeoff")
 
 
 def _draw_front(ax: Axes, tradeoff: Tradeoff) -> None:

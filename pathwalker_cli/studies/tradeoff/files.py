@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.studies.measures import MEASURES, write_table
-from pathwalker_cli.studies.tradeoff_figures import save_tradeoff_figure
-from pathwalker_cli.studies.tradeoff_result import Tradeoff
+from pathwalker_cli.studies.tradeoff.figures import save_tradeoff_figure
+from pathwalker_cli.studies.tradeoff.result import Tradeoff
 
 __all__ = ["ENTRIES", "write_tradeoff"]
 
@@ -22,7 +22,7 @@ _HEADER: Final = (
     "status",
     "mesh",
     "dominated",
-    *(f"{measure.key} [{measure.unit}]" for measure in MEASURES),
+    *(measure.column for measure in MEASURES),
     "reintegration_position_error [rad or m]",
     "reintegration_velocity_error [rad/s or m/s]",
     "intervals",

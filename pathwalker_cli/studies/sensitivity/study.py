@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -20,18 +19,12 @@ from pathwalker_cli.ocp.resolve import Optimum
 from pathwalker_cli.output.run_folder import Run
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient_blocks import SegmentLengths, Strengths
-from pathwalker_cli.studies.base import NeighbourStudy, resolver_of
+from pathwalker_cli.studies.base import NeighbourStudy, require_optimum, resolver_of
 from pathwalker_cli.studies.journal import Journal
 from pathwalker_cli.studies.measures import all_measures, measures
+from pathwalker_cli.studies.sensitivity.result import Check, Sensitivities, Sensitivity
 
-__all__ = [
-    "Check",
-    "Sensitivities",
-    "Sensitivity",
-    "SensitivityStudy",
-    "default_places",
-    "sensitivities",
-]
+__all__ = ["SensitivityStudy", "default_places", "sensitivities"]
 
 POINTS: Final = "points"
 """Folder of the re-solves of a check."""
@@ -54,75 +47,6 @@ class SensitivityStudy(NeighbourStudy):
     tolerance: Annotated[float, Quantity("", 1e-12, 1e-6)] = 1e-9
     check: tuple[str, ...] = ()
     check_step: Step = 5e-4
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """The answer to one number.
-
-    Args:
-        place: A spring, or a place in the patient's file.
-        value: The number now in SI units; None where several numbers change by one factor.
-        derivatives: Derivative of every measure by the relative change of the number, so that
-            0.01 of it is what one percent does; SI units.
-        elasticities: The same relative to the measure: percent per percent; None where the
-            measure is 0.
-    """
-
-    place: str
-    value: float | None
-    derivatives: Mapping[str, float]
-    elasticities: Mapping[str, float | None]
-
-
-@dataclass(frozen=True)
-class Check:
-    """One answer beside a finite difference of two solves.
-
-    Args:
-        place: What was changed.
-        step: Relative change up and down.
-        derivatives: Central differences of the measures by the relative change.
-        iterations: Iterations of both solves together.
-        seconds: Seconds of both solves.
-        changed: Inequalities that are active in one of the solves and not in the optimum.
-    """
-
-    place: str
-    step: float
-    derivatives: Mapping[str, float]
-    iterations: int
-    seconds: float
-    changed: int
-
-
-@dataclass(frozen=True)
-class Sensitivities:
-    """All answers.
-
-    Args:
-        config: The problem.
-        patient: Id of the patient.
-        base: Measures of the optimum; SI units.
-        rows: The answers.
-        checks: Those that were checked.
-        active: Number of active inequalities at the optimum.
-        doubtful: Number of those that are neither clearly active nor clearly inactive.
-        seconds: Wall seconds of the answers, without solving the optimum and without checks.
-    """
-
-    config: StudyConfig
-    patient: str
-    base: Mapping[str, float]
-    rows: tuple[Sensitivity, ...]
-    checks: tuple[Check, ...]
-    active: int
-    doubtful: int
-    seconds: float
-
-    def row(self, place: str) -> Sensitivity:
-        """Return the answer to one number."""
-        return next(row for row in self.rows if row.place == place)
 
 
 def default_places(patient: Patient, worn: bool) -> tuple[str, ...]:
@@ -157,12 +81,8 @@ def sensitivities(asked: SensitivityStudy, run: Run, folder: Path) -> Sensitivit
     """
     config = with_values(run.config, {"solver.tolerance": asked.tolerance})
     resolver = resolver_of(run, asked.tolerance)
+    require_optimum(resolver, run, asked.tolerance)
     around = Neighbourhood(resolver)
-    if not around.optimum.converged:
-        raise NotConvergedError(
-            f"the optimum in {run.folder} could not be solved to a tolerance of "
-            f"{asked.tolerance:g}: {around.optimum.result.status}"
-        )
     began = time.perf_counter()
     patient = around.optimum.solver.walker.patient
     worn = config.condition == "orthosis"

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.save import save_formats
 from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
+    MARKER,
     NEUTRAL,
     PAGE,
     SMALL,
@@ -24,13 +25,10 @@ from pathwalker_cli.output.figures.style import (
     new_figure,
 )
 from pathwalker_cli.studies.measures import COMPARED, measure_of
-from pathwalker_cli.studies.perturbation_result import Perturbation, Perturbed
-from pathwalker_cli.studies.perturbation_text import paper_changes
+from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
+from pathwalker_cli.studies.perturbation.text import paper_changes
 
 __all__ = ["perturbation_figure", "save_perturbation_figure"]
-
-_MARKER: Final = {"right": "o", "left": "s"}
-"""Sides differ without colour too."""
 
 _LEAST_SPAN: Final = 0.02
 """Least width of an axis [%]: smaller changes are none."""
@@ -38,10 +36,7 @@ _LEAST_SPAN: Final = 0.02
 
 def save_perturbation_figure(result: Perturbation, folder: Path) -> None:
     """Save the figure as PNG and SVG."""
-    folder.mkdir(parents=True, exist_ok=True)
-    figure = perturbation_figure(result)
-    for extension in ("png", "svg"):
-        save_figure(figure, folder / f"perturbation.{extension}")
+    save_formats(perturbation_figure(result), folder, "perturbation")
 
 
 def perturbation_figure(result: Perturbation) -> Figure:
@@ -76,7 +71,7 @@ def _draw(ax: Axes, result: Perturbation, key: str) -> None:
         if key in row.changes:
             x = 100.0 * row.changes[key]
             ax.plot([0.0, x], [y, y], color=LINE_COLOUR[side], linewidth=1.4, solid_capstyle="butt")
-            ax.plot(x, y, _MARKER[side], color=LINE_COLOUR[side], markersize=4.5)
+            ax.plot(x, y, MARKER[side], color=LINE_COLOUR[side], markersize=4.5)
             shown.append(x)
         paper = paper_changes(result, row)
         if key in paper:
@@ -92,7 +87,7 @@ def _draw(ax: Axes, result: Perturbation, key: str) -> None:
 def _handles(result: Perturbation) -> list[Artist]:
     """Return the entries of the legend."""
     handles: list[Artist] = [
-        Line2D([], [], color=LINE_COLOUR[side], marker=_MARKER[side], markersize=4.5,
+        Line2D([], [], color=LINE_COLOUR[side], marker=MARKER[side], markersize=4.5,
                label=f"{side} spring moved")
         for side in reversed(BOTH_SIDES)
     ]  # fmt: skip

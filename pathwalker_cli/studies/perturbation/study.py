@@ -15,14 +15,14 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from pathwalker_cli.config import StudyConfig, with_values
-from pathwalker_cli.errors import ConfigError, NotConvergedError
+from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import Quantity, invalid
 from pathwalker_cli.ocp.resolve import Optimum
 from pathwalker_cli.output.run_folder import Run
-from pathwalker_cli.studies.base import NeighbourStudy, resolver_of
+from pathwalker_cli.studies.base import NeighbourStudy, require_optimum, resolver_of
 from pathwalker_cli.studies.journal import Journal
 from pathwalker_cli.studies.measures import measures
-from pathwalker_cli.studies.perturbation_result import Perturbation, Perturbed, remark
+from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed, remark
 from pathwalker_cli.studies.springs import Ranges, Spring, ends, free_springs, spring_ranges
 
 __all__ = ["PerturbationStudy", "perturb"]
@@ -71,12 +71,7 @@ def perturb(
     began = time.perf_counter()
     config = with_values(run.config, {"solver.tolerance": study.tolerance})
     resolver = resolver_of(run, study.tolerance)
-    base = resolver.optimum
-    if not base.converged:
-        raise NotConvergedError(
-            f"the optimum in {run.folder} could not be solved to a tolerance of "
-            f"{study.tolerance:g}: {base.result.status}"
-        )
+    base = require_optimum(resolver, run, study.tolerance)
     ranges = spring_ranges(base)
     plan = _plan(study, config, measures(base), ranges)
     journal = Journal(folder / POINTS, run, resolver)

@@ -16,9 +16,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLo
 
 from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
-from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.save import save_formats
 from pathwalker_cli.output.figures.style import PAGE, SMALL, STYLE, new_figure
-from pathwalker_cli.studies.landscape_result import Landscape
+from pathwalker_cli.studies.landscape.result import Landscape
 from pathwalker_cli.studies.measures import measure_of
 
 __all__ = ["landscape_figure", "save_landscape_figure"]
@@ -64,9 +64,7 @@ def save_landscape_figure(folder: Path, landscape: Landscape) -> None:
         folder: Where.
         landscape: The landscape.
     """
-    figure = landscape_figure(landscape)
-    for extension in ("png", "svg"):
-        save_figure(figure, folder / f"landscape.{extension}")
+    save_formats(landscape_figure(landscape), folder, "landscape")
 
 
 def _draw_cost(fig: Figure, ax: Axes, landscape: Landscape) -> None:

@@ -9,11 +9,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.save import save_formats
 from pathwalker_cli.output.figures.style import NEUTRAL, PAGE, STYLE, dress, new_figure
 from pathwalker_cli.studies.measures import measure_of
-from pathwalker_cli.studies.sensitivity import Sensitivities
-from pathwalker_cli.studies.sensitivity_text import label_of
+from pathwalker_cli.studies.sensitivity.result import Sensitivities
+from pathwalker_cli.studies.sensitivity.text import label_of
 
 __all__ = ["save_sensitivity_figure", "sensitivity_figure"]
 
@@ -52,8 +52,6 @@ def sensitivity_figure(result: Sensitivities) -> Figure:
 
 def save_sensitivity_figure(result: Sensitivities, folder: Path) -> None:
     """Write `sensitivity.png` and `sensitivity.svg`."""
-    folder.mkdir(parents=True, exist_ok=True)
     with mpl.rc_context(STYLE):
         figure = sensitivity_figure(result)
-        for extension in ("png", "svg"):
-            save_figure(figure, folder / f"sensitivity.{extension}")
+    save_formats(figure, folder, "sensitivity")

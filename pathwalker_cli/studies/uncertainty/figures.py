@@ -14,9 +14,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.figures.save import save_figure
+from pathwalker_cli.output.figures.save import save_formats
 from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
+    MARKER,
     NEUTRAL,
     PAGE,
     SMALL,
@@ -26,11 +27,10 @@ from pathwalker_cli.output.figures.style import (
     new_figure,
 )
 from pathwalker_cli.studies.measures import Measure
-from pathwalker_cli.studies.uncertainty_result import Spread, Uncertainty, chance_level, spreads
+from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
 
 __all__ = ["correlation_figure", "save_uncertainty_figures", "spread_figure"]
 
-_MARKER: Final = {"right": "o", "left": "s"}
 _STRIP: Final = 0.22
 """Half the height over which points of a row are scattered, so that equal ones can be told."""
 
@@ -44,15 +44,9 @@ def save_uncertainty_figures(result: Uncertainty, folder: Path) -> None:
     """Save all figures as PNG and SVG; none without draws that converged."""
     if not result.converged:
         return
-    folder.mkdir(parents=True, exist_ok=True)
     found = spreads(result)
-    figures = {
-        "uncertainty": spread_figure(result, found),
-        "correlations": correlation_figure(result, found),
-    }
-    for name, figure in figures.items():
-        for extension in ("png", "svg"):
-            save_figure(figure, folder / f"{name}.{extension}")
+    save_formats(spread_figure(result, found), folder, "uncertainty")
+    save_formats(correlation_figure(result, found), folder, "correlations")
 
 
 def spread_figure(result: Uncertainty, found: list[Spread]) -> Figure:
@@ -93,7 +87,7 @@ def _draw(ax: Axes, y: int, values: np.ndarray, spread: Spread, unit: float) -> 
         unit: 100 for deviations in %, where the base is zero; 1 for the values themselves.
     """
     side = next((side for side in BOTH_SIDES if side in spread.measure.key), None)
-    colour, marker = (LINE_COLOUR[side], _MARKER[side]) if side else (NEUTRAL, "^")
+    colour, marker = (LINE_COLOUR[side], MARKER[side]) if side else (NEUTRAL, "^")
     heights = y + np.random.default_rng(_SEED).uniform(-_STRIP, _STRIP, len(values))
     ax.plot(values, heights, marker, color=colour, markersize=2.6, alpha=0.45, mew=0.0)
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
@@ -133,9 +127,7 @@ def _handles(count: int) -> list[Artist]:
     """Return the entries of the legend."""
     point: dict[str, Any] = {"color": NEUTRAL, "linewidth": 0}
     sides: list[Artist] = [
-        Line2D(
-            [], [], color=LINE_COLOUR[s], marker=_MARKER[s], linewidth=0, markersize=4.5, label=s
-        )
+        Line2D([], [], color=LINE_COLOUR[s], marker=MARKER[s], linewidth=0, markersize=4.5, label=s)
         for s in reversed(BOTH_SIDES)
     ]
     return [

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.io.atomic import atomic_open
+from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.studies.measures import MEASURES, Measure, measure_of, write_table
-from pathwalker_cli.studies.sensitivity import Check, Sensitivities, Sensitivity
+from pathwalker_cli.studies.sensitivity.result import Check, Sensitivities, Sensitivity
 
 __all__ = ["FILES", "agreement", "label_of", "sensitivity_lines", "write_sensitivities"]
 
@@ -52,9 +51,7 @@ def write_sensitivities(result: Sensitivities, folder: Path) -> None:
     write_table(folder / FILES[0], header, rows)
     if result.checks:
         write_table(folder / FILES[1], _CHECK_HEADER, _check_rows(result))
-    with atomic_open(folder / FILES[2]) as file:
-        json.dump(_content(result), file, indent=2, ensure_ascii=False, allow_nan=False)
-        file.write("\n")
+    write_json(folder / FILES[2], _content(result))
 
 
 _CHECK_HEADER: Final = (

@@ -17,8 +17,8 @@ from pathwalker_cli.ocp.resolve import Optimum
 from pathwalker_cli.output.run_folder import Run
 from pathwalker_cli.studies.branches import explore
 from pathwalker_cli.studies.graph import Exploration, Graph, Rules, Values
-from pathwalker_cli.studies.landscape_result import ROOT, Landscape, Point
-from pathwalker_cli.studies.landscape_study import LandscapeStudy, axis_values
+from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
+from pathwalker_cli.studies.landscape.study import LandscapeStudy, axis_values
 from pathwalker_cli.studies.measures import measures
 from pathwalker_cli.studies.neighbours import Neighbours, motion_distance, motion_signature
 from pathwalker_cli.studies.springs import require_springs

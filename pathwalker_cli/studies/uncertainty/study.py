@@ -10,17 +10,16 @@ from typing import Annotated, Final
 from pydantic import Field
 
 from pathwalker_cli.config import StudyConfig, study_patient, with_values
-from pathwalker_cli.errors import InputError, NotConvergedError, PatientError
+from pathwalker_cli.errors import InputError, PatientError
 from pathwalker_cli.io.fields import Quantity
-from pathwalker_cli.ocp.resolve import Optimum
 from pathwalker_cli.output.run_folder import Run
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.studies.base import NeighbourStudy, resolver_of
-from pathwalker_cli.studies.draws import Distribution, Draws, draw, inputs_of
+from pathwalker_cli.studies.base import NeighbourStudy, require_optimum, resolver_of
 from pathwalker_cli.studies.measures import measures
 from pathwalker_cli.studies.pool import Job, Solved, for_far_neighbours, solve_jobs
 from pathwalker_cli.studies.springs import spring_ranges
-from pathwalker_cli.studies.uncertainty_result import Uncertainty
+from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, draw, inputs_of
+from pathwalker_cli.studies.uncertainty.result import Uncertainty
 
 __all__ = ["UncertaintyStudy", "draw_configs", "uncertainty"]
 
@@ -61,7 +60,7 @@ def uncertainty(
     config = with_values(config, {"solver.tolerance": study.tolerance})
     draws = draw(inputs_of(study.quantities, load_patient(config.patient)), study.draws, study.seed)
     jobs = [Job(f"draw-{i:05d}", c) for i, c in enumerate(draw_configs(config, draws))]
-    base = _base(run, study.tolerance)
+    base = require_optimum(resolver_of(run, study.tolerance), run, study.tolerance)
     solved = list(solve_jobs(jobs, run.folder, folder / DRAWS, study.tolerance, workers, told))
     solved.sort(key=lambda end: end.name)
     return Uncertainty(
@@ -75,17 +74,6 @@ def uncertainty(
         seconds=time.perf_counter() - began,
         workers=min(workers, len(jobs)),
     )
-
-
-def _base(run: Run, tolerance: float) -> Optimum:
-    """Return the optimum of a run to the tolerance of the draws."""
-    base = resolver_of(run, tolerance).optimum
-    if not base.converged:
-        raise NotConvergedError(
-            f"the optimum in {run.folder} could not be solved to a tolerance of {tolerance:g}: "
-            f"{base.result.status}"
-        )
-    return base
 
 
 def draw_configs(config: StudyConfig, draws: Draws) -> list[StudyConfig]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from pathwalker_cli.studies.landscape_result import Landscape, Point, Region
+from pathwalker_cli.studies.landscape.result import Landscape, Point, Region
 
 __all__ = ["landscape_lines"]
 

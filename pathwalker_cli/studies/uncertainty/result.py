@@ -14,10 +14,10 @@ import numpy as np
 from scipy import stats
 
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.studies.draws import Draws, Input
 from pathwalker_cli.studies.measures import MEASURES, Measure
 from pathwalker_cli.studies.pool import Solved
 from pathwalker_cli.studies.springs import Ranges, ends
+from pathwalker_cli.studies.uncertainty.draws import Draws, Input
 
 __all__ = ["Spread", "Uncertainty", "chance_level", "rank_correlations", "spreads"]
 

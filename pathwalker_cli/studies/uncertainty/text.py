@@ -12,7 +12,7 @@ import numpy as np
 from pathwalker_cli.studies.measures import Measure, write_table
 from pathwalker_cli.studies.pool import Solved
 from pathwalker_cli.studies.springs import free_springs
-from pathwalker_cli.studies.uncertainty_result import Spread, Uncertainty, chance_level, spreads
+from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
 
 __all__ = ["FILES", "failure_lines", "uncertainty_lines", "write_uncertainty"]
 
@@ -51,7 +51,7 @@ def write_uncertainty(result: Uncertainty, folder: Path) -> None:
 def _write_draws(result: Uncertainty, path: Path) -> None:
     """Write one row per draw: what was drawn, where it ended, and how to solve it again."""
     header = ["draw", *(entry.heading for entry in result.draws.inputs), "status"]
-    header += [f"{m.key} [{m.unit}]" for m in result.measures]
+    header += [measure.column for measure in result.measures]
     header += ["iterations", "seconds [s]", "variation"]
     rows = []
     for number, end in enumerate(result.solved):

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.io.atomic import atomic_open
-from pathwalker_cli.studies.landscape_figures import save_landscape_figure
-from pathwalker_cli.studies.landscape_result import Landscape, Point, Region
+from pathwalker_cli.io.json_file import write_json
+from pathwalker_cli.studies.landscape.figures import save_landscape_figure
+from pathwalker_cli.studies.landscape.result import Landscape, Point, Region
 from pathwalker_cli.studies.measures import MEASURES, write_table
 
 __all__ = ["ENTRIES", "write_landscape"]
@@ -28,7 +27,7 @@ _HEADER: Final = (
     "branch",
     "status",
     "cost_increase [1]",
-    *(f"{measure.key} [{measure.unit}]" for measure in MEASURES),
+    *(measure.column for measure in MEASURES),
     "solves",
     "iterations",
     "seconds",
@@ -44,8 +43,7 @@ def write_landscape(folder: Path, landscape: Landscape) -> None:
     """
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     write_table(folder / _TABLE, _HEADER, _rows(landscape))
-    with atomic_open(folder / _SUMMARY) as file:
-        file.write(json.dumps(_summary(landscape), indent=2, ensure_ascii=False) + "\n")
+    write_json(folder / _SUMMARY, _summary(landscape))
     save_landscape_figure(folder / "figures", landscape)
 
 
@@ -77,7 +75,8 @@ def _summary(landscape: Landscape) -> dict[str, Any]:
         "tolerance": landscape.tolerance,
         "region": _region(landscape.region),
         "reintegration": {
-            name: {"position": q, "velocity": v} for name, (q, v) in landscape.checks.items()
+            name: {"position": _number(q), "velocity": _number(v)}
+            for name, (q, v) in landscape.checks.items()
         },
         "reintegration_allowed": dict(
             zip(("position", "velocity"), landscape.allowed, strict=True)
@@ -112,7 +111,12 @@ def _point(point: Point) -> dict[str, Any]:
     return {
         "point": point.name,
         "status": point.status,
-        "dorsiflexion_stiffness": point.k_d if np.isfinite(point.k_d) else None,
-        "plantarflexion_stiffness": point.k_p if np.isfinite(point.k_p) else None,
+        "dorsiflexion_stiffness": _number(point.k_d),
+        "plantarflexion_stiffness": _number(point.k_p),
         "measures": dict(point.measures),
     }
+
+
+def _number(value: float) -> float | None:
+    """Return a number, None for what is none: JSON knows no NaN."""
+    return value if np.isfinite(value) else None

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
-from pathwalker_cli.io.atomic import atomic_open
+from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.studies.measures import COMPARED, MEASURES, measure_of, write_table
-from pathwalker_cli.studies.perturbation_result import Perturbation, Perturbed
+from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
 from pathwalker_cli.studies.springs import ends
 
 __all__ = ["FILES", "paper_changes", "perturbation_lines", "verdict", "write_perturbation"]
@@ -44,7 +43,7 @@ def write_perturbation(result: Perturbation, folder: Path) -> None:
     """Write `perturbation.csv` and `perturbation.json`."""
     keys = [m.key for m in MEASURES if m.key in result.base]
     header = ["spring", "factor [1]", "stiffness [N m/rad]", "status"]
-    header += [f"{key} [{measure_of(key).unit}]" for key in keys]
+    header += [measure_of(key).column for key in keys]
     header += [f"change of {key} [%]" for key in keys]
     header += [f"change of {key} in the article [%]" for key in COMPARED]
     header += ["note", "iterations", "seconds [s]"]
@@ -52,9 +51,7 @@ def write_perturbation(result: Perturbation, folder: Path) -> None:
     base: list[Any] = ["", 1.0, None, "converged", *(result.base[key] for key in keys)]
     base += [None] * (len(keys) + len(COMPARED)) + ["the optimum", None, None]
     write_table(folder / FILES[0], header, [base, *rows])
-    with atomic_open(folder / FILES[1]) as file:
-        json.dump(_content(result), file, indent=2, ensure_ascii=False, allow_nan=False)
-        file.write("\n")
+    write_json(folder / FILES[1], _content(result))
 
 
 def _cells(result: Perturbation, row: Perturbed, keys: list[str]) -> list[Any]:

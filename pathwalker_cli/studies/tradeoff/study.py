@@ -10,7 +10,8 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, field_validator
 
-from pathwalker_cli.config import StudyConfig, Weight, with_values
+from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.config.schema import Weight
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import AS_TUPLE, invalid
 from pathwalker_cli.ocp.resolve import Optimum
@@ -22,7 +23,7 @@ from pathwalker_cli.studies.graph import Exploration, Graph, Rules, Values
 from pathwalker_cli.studies.measures import MEASURES, measures
 from pathwalker_cli.studies.neighbours import Neighbours, motion_signature
 from pathwalker_cli.studies.run import RunLog, is_done
-from pathwalker_cli.studies.tradeoff_result import FrontPoint, Tradeoff
+from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
 __all__ = ["TradeoffStudy", "chain", "tradeoff_of"]
 

@@ -1,23 +1,19 @@
-"""Study configs: YAML in, validated frozen models out; every numerical choice has its place."""
+"""Every key of a study config with type, range and default: all numerical choices."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Collection, Iterable, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from pathwalker_cli.config.nested import merged
 from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, Condition
-from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
-from pathwalker_cli.io.yaml_file import read_mapping, read_value, validate
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.paths import shipped
-from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient_blocks import Stiffness
 from pathwalker_cli.problems import PROBLEMS
-from pathwalker_cli.variation import Variation, varied
+from pathwalker_cli.variation import Variation
 
 __all__ = [
     "BoundsConfig",
@@ -27,13 +23,6 @@ __all__ = [
     "SolverConfig",
     "StartConfig",
     "StudyConfig",
-    "apply_change",
-    "find_config",
-    "load_config",
-    "patient_path",
-    "smoke_version",
-    "study_patient",
-    "with_values",
 ]
 
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
@@ -49,6 +38,20 @@ def _ordered(value: tuple[float, float]) -> tuple[float, float]:
     if value[0] > value[1]:
         raise invalid(f"is [{value[0]:g}, {value[1]:g}], upside down", allowed="[lower, upper]")
     return value
+
+
+def _named(names: Iterable[str], allowed: Collection[str]) -> None:
+    """Refuse a name that there is not."""
+    for name in names:
+        if name not in allowed:
+            raise invalid(f"names '{name}'", allowed=", ".join(allowed))
+
+
+def _named_ranges(ranges: Mapping[str, tuple[float, float]], allowed: Collection[str]) -> None:
+    """Refuse ranges of what there is not, and those that are upside down."""
+    _named(ranges, allowed)
+    for pair in ranges.values():
+        _ordered(pair)
 
 
 def _as_text(value: Any) -> Any:
@@ -111,28 +114,19 @@ class BoundsConfig(YamlModel):
     @field_validator("joint_ranges", "fallback_joint_ranges")
     @classmethod
     def _coordinates(cls, value: dict[str, Range]) -> dict[str, Range]:
-        for name, pair in value.items():
-            if name not in COORDINATES[2:]:
-                raise invalid(f"names '{name}'", allowed=", ".join(COORDINATES[2:]))
-            _ordered(pair)
+        _named_ranges(value, COORDINATES[2:])
         return value
 
     @field_validator("phase_durations")
     @classmethod
     def _phases(cls, value: dict[str, Any]) -> dict[str, Any]:
-        for name, pair in value.items():
-            if name not in PHASE_NAMES:
-                raise invalid(f"names '{name}'", allowed=", ".join(PHASE_NAMES))
-            _ordered(pair)
+        _named_ranges(value, PHASE_NAMES)
         return value
 
     @field_validator("stiffness")
     @classmethod
     def _springs(cls, value: dict[str, Any]) -> dict[str, Any]:
-        for name, pair in value.items():
-            if name not in STIFFNESSES:
-                raise invalid(f"names '{name}'", allowed=", ".join(STIFFNESSES))
-            _ordered(pair)
+        _named_ranges(value, STIFFNESSES)
         return value
 
     @field_validator(
@@ -182,9 +176,7 @@ class StartConfig(YamlModel):
     @field_validator("stiffness")
     @classmethod
     def _stiffnesses(cls, value: dict[str, float]) -> dict[str, float]:
-        for name in value:
-            if name not in STIFFNESSES:
-                raise invalid(f"names '{name}'", allowed=", ".join(STIFFNESSES))
+        _named(value, STIFFNESSES)
         return value
 
 
@@ -259,115 +251,3 @@ class StudyConfig(YamlModel):
     def fits(self) -> bool:
         """Whether a recording is followed, equation (8), instead of a gait predicted."""
         return PROBLEMS[self.problem].goal == "fit"
-
-
-def merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Return two nested mappings as one; where both have a value, `over` counts."""
-    result = dict(under)
-    for key, value in over.items():
-        below = result.get(key)
-        if isinstance(below, Mapping) and isinstance(value, Mapping):
-            result[key] = merged(below, value)
-        else:
-            result[key] = value
-    return result
-
-
-def load_config(path: str | Path, problem: str = "", changes: tuple[str, ...] = ()) -> StudyConfig:
-    """Read a study config.
-
-    Args:
-        path: The YAML file, or the name of a shipped one, e.g. "mapd-orthosis".
-        problem: Problem that was asked for; it must be the config's own.
-        changes: Overrides "dotted.key=value", as from the command line.
-
-    Raises:
-        ConfigError: If file or overrides are wrong.
-    """
-    source = find_config(Path(path))
-    mapping, lines = read_mapping(source, ConfigError)
-    for change in changes:
-        apply_change(mapping, change)
-    config = validate(mapping, StudyConfig, where=str(path), error=ConfigError, lines=lines)
-    if problem and config.problem != problem:
-        raise ConfigError(
-            f"is a config for {config.problem}, but {problem} was asked for",
-            where=f"{path}, problem",
-            mend=f"use configs/{problem}.yaml, or ask for {config.problem}",
-        )
-    return config.model_copy(update={"patient": patient_path(config.patient, source)})
-
-
-def find_config(path: Path) -> Path:
-    """Return the file, or the shipped config of that name where there is no such file."""
-    if not path.is_file():
-        for name in (path.name, f"{path.name}.yaml"):
-            candidate = shipped("configs") / name
-            if candidate.is_file() and path.parent.name in ("", "configs"):
-                return candidate
-    return path
-
-
-def patient_path(patient: str, config_file: Path) -> str:
-    """Return a patient path relative to the config's folder as a full path; ids stay."""
-    candidate = config_file.parent / patient
-    return str(candidate.resolve()) if "/" in patient or candidate.is_file() else patient
-
-
-def study_patient(config: StudyConfig) -> Patient:
-    """Return the patient of a study, with its variation.
-
-    Raises:
-        PatientError: If there is no such patient or its file is refused.
-        ConfigError: If the variation does not fit the patient.
-    """
-    return varied(load_patient(config.patient), config.variation)
-
-
-def apply_change(mapping: dict[str, Any], change: str) -> None:
-    """Put one override "a.b=value" into a mapping; the value is read as YAML."""
-    key, equals, text = change.partition("=")
-    if not equals or not key.strip():
-        raise ConfigError(f"'{change}' is no override", where="--set", allowed="dotted.key=value")
-    value = read_value(text, f"--set {key}")
-    *parents, last = key.strip().split(".")
-    for parent in parents:
-        mapping = mapping.setdefault(parent, {})
-        if not isinstance(mapping, dict):
-            raise ConfigError(f"'{parent}' holds no keys", where=f"--set {key}")
-    mapping[last] = value
-
-
-def with_values(config: StudyConfig, values: Mapping[str, Any], where: str = "") -> StudyConfig:
-    """Return a config with some values replaced and validated anew.
-
-    Args:
-        config: The config.
-        values: New values by dotted key, e.g. {"cost.walking_speed_weight": 1.0}.  A mapping at a
-            section, e.g. {"mesh": {...}}, replaces only what it names; one below a section, e.g.
-            {"variation.scale": {...}}, takes the place of what was there.
-        where: Origin of the values, for the message.
-
-    Raises:
-        ConfigError: If a key does not exist or a value is refused.
-    """
-    content: dict[str, Any] = config.model_dump(mode="json")
-    for key, value in values.items():
-        *parents, last = key.split(".")
-        holder = content
-        for parent in parents:
-            holder = holder.setdefault(parent, {})
-            if not isinstance(holder, dict):
-                raise ConfigError(f"'{parent}' holds no keys", where=f"{where}, {key}")
-        whole = isinstance(value, Mapping) and not parents and isinstance(holder.get(last), dict)
-        holder[last] = merged(holder[last], value) if whole else value
-    return validate(content, StudyConfig, where=where or "overrides", error=ConfigError)
-
-
-def smoke_version(config: StudyConfig) -> StudyConfig:
-    """Return a config with a short horizon for quick checks: coarse mesh, no refinement."""
-    mesh = config.mesh.model_copy(update={"intervals": (2,) * len(PHASE_NAMES), "refinements": 0})
-    loose = {"max_iterations": min(400, config.solver.max_iterations), "tolerance": 1e-3}
-    solver = config.solver.model_copy(update=loose)
-    changes = {"mesh": mesh, "solver": solver, "smoke": True, "verdict": False}
-    return config.model_copy(update=changes)

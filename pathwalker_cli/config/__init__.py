@@ -1,0 +1,32 @@
+"""Study configs: what they hold, how they are read, and how single values are overridden."""
+
+from __future__ import annotations
+
+from pathwalker_cli.config.files import find_config, load_config, patient_path, study_patient
+from pathwalker_cli.config.overrides import apply_change, smoke_version, with_values
+from pathwalker_cli.config.schema import (
+    BoundsConfig,
+    CostConfig,
+    MeshConfig,
+    ModelConfig,
+    SolverConfig,
+    StartConfig,
+    StudyConfig,
+)
+
+__all__ = [
+    "BoundsConfig",
+    "CostConfig",
+    "MeshConfig",
+    "ModelConfig",
+    "SolverConfig",
+    "StartConfig",
+    "StudyConfig",
+    "apply_change",
+    "find_config",
+    "load_config",
+    "patient_path",
+    "smoke_version",
+    "study_patient",
+    "with_values",
+]

@@ -1,0 +1,1 @@
+"""Cost and gait over the springs of a side."""

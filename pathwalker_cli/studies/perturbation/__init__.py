@@ -1,0 +1,1 @@
+"""What moving single springs does to an optimum."""

@@ -1,0 +1,1 @@
+"""What every number of patient and orthosis does to an optimum."""

@@ -1,0 +1,1 @@
+"""Effort against walking speed."""

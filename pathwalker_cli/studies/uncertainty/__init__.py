@@ -1,0 +1,1 @@
+"""How far the answers spread if the numbers of the patient are uncertain."""
