@@ -1,20 +1,25 @@
 """Nonlinear programs assembled from many small, repeated blocks.
 
 A block is one small SX function of a few unknowns; it occurs many times with other unknowns.  Its
-Jacobian and Hessian are derived once, mapped over all occurrences, and scattered into the sparse
+Jacobian and Hessian are derived once, evaluated at all occurrences, and scattered into the sparse
 derivatives of the whole.  Building therefore costs the same on every mesh.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
+from pathwalker_cli.ocp.assembly import KINDS, Assembly, Part, Source
 from pathwalker_cli.ocp.frozen import FrozenTerms
+from pathwalker_cli.ocp.kernels import kernels
+from pathwalker_cli.ocp.mapped import mapped_functions
+from pathwalker_cli.ocp.tape import Tape
+from pathwalker_cli.ocp.taped import taped_functions
 
 __all__ = ["Block", "BlockProgram", "Occurrences"]
 
@@ -59,7 +64,7 @@ class Block:
     @cached_property
     def values(self) -> ca.Function:
         """Function (unknowns, data, shared) -> constraints, objective."""
-        return self._function("values", [self.constraints, self.objective], [])
+        return self._function("values", [self.constraints, ca.sparsify(self.objective)], [])
 
     @cached_property
     def jacobian(self) -> ca.Function:
@@ -73,6 +78,17 @@ class Block:
         lagrangian = lam_f * self.objective + ca.dot(lam_g, self.constraints)
         hessian = ca.triu(ca.hessian(lagrangian, self.unknowns)[0])
         return self._function("hessian", [hessian], [lam_f, lam_g])
+
+    @cached_property
+    def tapes(self) -> dict[str, Tape] | None:
+        """Tapes of `values`, `jacobian` and `hessian`; None where one cannot be made."""
+        tapes = {}
+        for kind in KINDS:
+            tape = Tape.of(getattr(self, kind))
+            if tape is None:
+                return None
+            tapes[kind] = tape
+        return tapes
 
     @cached_property
     def _first_derivatives(self) -> list[ca.SX]:
@@ -182,104 +198,48 @@ class BlockProgram:
         instance, local = divmod(row - self._row_offsets[which], occurrence.block.rows)
         return occurrence.row_names[local], occurrence.labels[instance]
 
+    def rows_of(self, block: Block) -> np.ndarray:
+        """Return the rows of g that a block stands for, shape (rows, occurrences)."""
+        i = next(i for i, o in enumerate(self.occurrences) if o.block is block)
+        shape = (block.rows, self.occurrences[i].count)
+        return self._row_offsets[i] + np.arange(np.prod(shape)).reshape(shape, order="F")
+
     @property
     def row_scale(self) -> np.ndarray:
         """Physical units per unit of every row."""
         return np.concatenate([np.tile(o.row_scale, o.count) for o in self.occurrences])
 
-    def functions(self) -> dict[str, ca.Function]:
-        """Return `nlp`, `grad_f`, `jac_g` and `hess_lag` in the form that `casadi.nlpsol` takes."""
-        x, p = ca.MX.sym("x", self.size), ca.MX.sym("p", int(self._data_offsets[-1]))
-        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.rows)
-        g, f = self._values(x, p)
-        jacobian, gradient = self._first_order(x, p)
-        hessian = self._second_order(x, p, lam_f, lam_g)
-        names = {"x": x, "p": p}
-        return {
-            "nlp": ca.Function("nlp", [x, p], [f, g], ["x", "p"], ["f", "g"]),
-            "grad_f": ca.Function("grad_f", [x, p], [f, gradient], list(names), ["f", "grad_f_x"]),
-            "jac_g": ca.Function("jac_g", [x, p], [g, jacobian], list(names), ["g", "jac_g_x"]),
-            "hess_lag": ca.Function(
-                "hess_lag",
-                [x, p, lam_f, lam_g],
-                [hessian],
-                ["x", "p", "lam_f", "lam_g"],
-                ["triu_hess_gamma_x_x"],
-            ),
-        }
+    def functions(self) -> Mapping[str, ca.Function]:
+        """Return `nlp`, `grad_f`, `jac_g` and `hess_lag` in the form that `casadi.nlpsol` takes.
 
-    def _inputs(self, i: int, x: ca.MX, p: ca.MX) -> list[ca.MX]:
-        """Return unknowns, data and shared numbers of all occurrences of block i, one a column."""
-        o = self.occurrences[i]
-        unknowns = ca.reshape(x[o.columns.ravel(order="F").tolist()], *o.columns.shape)
-        data = p[int(self._data_offsets[i]) : int(self._data_offsets[i + 1])]
-        shared = p[: self.shared_size]
-        return [unknowns, ca.reshape(data, *o.data.shape), shared]
+        They live as long as this program or the mapping does; a solver alone does not keep them.
+        """
+        return self._functions
 
-    def _mapped(self, function: ca.Function, count: int) -> ca.Function:
-        """Return a function mapped over columns; the shared numbers (input 2, lam_f) are not."""
-        fixed = [2] + ([3] if function.n_in() > 3 else [])
-        return function.map(f"{function.name()}_{count}", "serial", count, fixed, [])
+    @cached_property
+    def _functions(self) -> Mapping[str, ca.Function]:
+        tapes = [o.block.tapes for o in self.occurrences] if kernels() is not None else [None]
+        known = [of_block for of_block in tapes if of_block is not None]
+        if len(known) < len(tapes):
+            return mapped_functions(self._assembly)
+        return taped_functions(self._assembly, known)
 
-    def _values(self, x: ca.MX, p: ca.MX) -> tuple[ca.MX, ca.MX]:
-        rows, objective = [], ca.MX(0)
-        for i, o in enumerate(self.occurrences):
-            g, f = self._mapped(o.block.values, o.count)(*self._inputs(i, x, p))
-            rows.append(ca.vec(g))
-            if o.block.has_objective:
-                objective += ca.sum2(f)
-        return ca.vertcat(*rows), objective
+    @cached_property
+    def _assembly(self) -> Assembly:
+        parts = [
+            Part({kind: getattr(o.block, kind) for kind in KINDS}, o.count, self._sources(i, o))
+            for i, o in enumerate(self.occurrences)
+        ]
+        return Assembly(self.size, int(self._data_offsets[-1]), self.rows, parts)
 
-    def _first_order(self, x: ca.MX, p: ca.MX) -> tuple[ca.MX, ca.MX]:
-        entries, row_of, column_of = [], [], []
-        gradient = ca.MX.zeros(self.size)
-        for i, o in enumerate(self.occurrences):
-            function = o.block.jacobian
-            rows, columns = (np.array(k, int) for k in function.sparsity_out(0).get_triplet())
-            blocks, slopes = self._mapped(function, o.count)(*self._inputs(i, x, p))
-            entries.append(ca.vec(blocks).nz[:])
-            offsets = self._row_offsets[i] + o.block.rows * np.arange(o.count)
-            row_of.append((rows[:, None] + offsets).ravel(order="F"))
-            column_of.append(o.columns[columns].ravel(order="F"))
-            if o.block.has_objective:
-                where = o.columns[np.array(function.sparsity_out(1).row(), int)].ravel(order="F")
-                gradient += _scatter(where, self.size) @ ca.vec(slopes).nz[:]
-        jacobian = _place(ca.vertcat(*entries), row_of, column_of, (self.rows, self.size))
-        return jacobian, gradient
-
-    def _second_order(self, x: ca.MX, p: ca.MX, lam_f: ca.MX, lam_g: ca.MX) -> ca.MX:
-        entries, row_of, column_of = [], [], []
-        for i, o in enumerate(self.occurrences):
-            function = o.block.hessian
-            rows, columns = (np.array(k, int) for k in function.sparsity_out(0).get_triplet())
-            if not rows.size:
-                continue
-            lam = lam_g[int(self._row_offsets[i]) : int(self._row_offsets[i + 1])]
-            inputs = [*self._inputs(i, x, p), lam_f, ca.reshape(lam, o.block.rows, o.count)]
-            entries.append(ca.vec(self._mapped(function, o.count)(*inputs)).nz[:])
-            first, second = o.columns[rows], o.columns[columns]
-            row_of.append(np.minimum(first, second).ravel(order="F"))
-            column_of.append(np.maximum(first, second).ravel(order="F"))
-        return _place(ca.vertcat(*entries), row_of, column_of, (self.size, self.size))
-
-
-def _scatter(where: np.ndarray, size: int) -> ca.DM:
-    """Return the 0/1 matrix that adds entry k of a vector into position where[k]."""
-    count = len(where)
-    return ca.DM.triplet(where.tolist(), list(range(count)), ca.DM.ones(count), size, count)
-
-
-def _place(
-    entries: ca.MX, rows: list[np.ndarray], columns: list[np.ndarray], shape: tuple[int, int]
-) -> ca.MX:
-    """Return the sparse matrix with these entries; entries at the same place are added."""
-    place = np.concatenate(columns) * shape[0] + np.concatenate(rows)
-    unique, inverse = np.unique(place, return_inverse=True)
-    pattern = ca.Sparsity.triplet(
-        *shape, (unique % shape[0]).tolist(), (unique // shape[0]).tolist()
-    )
-    if len(unique) == len(place):
-        values = entries[np.argsort(inverse).tolist()]
-    else:
-        values = _scatter(inverse, len(unique)) @ entries
-    return ca.MX(pattern, values)
+    def _sources(self, i: int, o: Occurrences) -> tuple[Source, ...]:
+        """Return where the inputs of block i come from."""
+        data = np.arange(o.data.size).reshape(o.data.shape, order="F")
+        rows = np.arange(o.lower.size).reshape(o.lower.shape, order="F")
+        return (
+            Source("x", o.columns),
+            Source("p", self._data_offsets[i] + data),
+            Source("p", np.arange(self.shared_size)[:, None]),
+            Source("lam_f", np.zeros((1, 1), int)),
+            Source("lam_g", self._row_offsets[i] + rows),
+        )

@@ -11,6 +11,7 @@ import numpy as np
 
 from pathwalker_cli.ocp.blocks import BlockProgram, Occurrences
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
+from pathwalker_cli.ocp.elimination import Elimination, elimination_of
 from pathwalker_cli.ocp.layout import Layout
 from pathwalker_cli.ocp.phased import (
     PhasedMotion,
@@ -252,6 +253,11 @@ class CollocationProgram:
             rows.names,
             ["the whole motion"],
         )
+
+    @property
+    def elimination(self) -> Elimination:
+        """Order in which a Newton step's unknowns are eliminated."""
+        return elimination_of(self)
 
     @cached_property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:

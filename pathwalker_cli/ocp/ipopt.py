@@ -15,6 +15,7 @@ import numpy as np
 
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.machine import keep_freed_memory, use_one_blas_thread
+from pathwalker_cli.ocp.stage_ldl import stage_factors
 
 __all__ = [
     "IpoptSettings",
@@ -58,6 +59,8 @@ class IpoptSettings:
             "mu_init": self.initial_barrier,
             "mu_strategy": "monotone",
             "nlp_scaling_method": "none",
+            "linear_system_scaling": "none",
+            "linear_solver": "mumps",
             "mumps_pivtol": 1e-4,
         }
         if not self.warm_start:
@@ -235,14 +238,19 @@ class NlpSolver:
     ) -> None:
         use_one_blas_thread()
         keep_freed_memory()
-        functions = program.program.functions()
+        # held: IPOPT does not keep functions alive that are written in Python
+        self._functions = functions = program.program.functions()
         self._watcher = _Watcher(program, observer)
+        self._factors = None
+        if program.elimination is not None and "linear_solver" not in settings.extra:
+            self._factors = stage_factors()
         options: dict[str, Any] = {
-            "ipopt": settings.as_options(),
+            "ipopt": settings.as_options() | (self._factors.ipopt_options if self._factors else {}),
             "print_time": False,
             "error_on_fail": False,
             "iteration_callback": self._watcher,
             "calc_lam_p": False,
+            "no_nlp_grad": True,
             **{key: functions[key] for key in ("grad_f", "jac_g", "hess_lag")},
         }
         self._solver = ca.nlpsol("solver", "ipopt", functions["nlp"], options)
@@ -276,6 +284,8 @@ class NlpSolver:
             arguments |= {"lam_x0": multipliers.unknowns, "lam_g0": multipliers.rows}
         self._watcher.begin(program)
         began = time.perf_counter()
+        if self._factors is not None:
+            self._factors.begin(program.elimination)
         with _interruptible(self._watcher):
             solution = self._solver(**arguments)
         seconds = time.perf_counter() - began

@@ -48,10 +48,10 @@ class Neighbourhood:
         self._resolver = resolver
         self.optimum = resolver.optimum
 
-    @cached_property
+    @property
     def kkt(self) -> KktSystem:
         """The KKT system at the optimum."""
-        return KktSystem(self.optimum.program, self.optimum.result)
+        return self.optimum.kkt
 
     @property
     def springs(self) -> tuple[str, ...]:
@@ -113,7 +113,7 @@ class Neighbourhood:
         Args:
             other: An optimum on the same mesh.
         """
-        return self.kkt.changed(KktSystem(other.program, other.result))
+        return self.kkt.changed(other.kkt)
 
     def _moved(self, values: Mapping[str, Any]) -> Optimum:
         """Return the optimum's unknowns in the program of other numbers."""

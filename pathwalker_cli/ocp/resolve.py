@@ -11,6 +11,7 @@ import numpy as np
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult, NlpSolver
+from pathwalker_cli.ocp.kkt import KktSystem
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries, gait_series
 from pathwalker_cli.ocp.solution import GaitSolution
@@ -77,6 +78,11 @@ class Optimum:
         """Errors of an independent integrator: the mesh was made for another problem."""
         return reintegrate(self.solver.walker, self.motion)
 
+    @cached_property
+    def kkt(self) -> KktSystem:
+        """The KKT system at this optimum."""
+        return KktSystem(self.program, self.result)
+
     @property
     def solution(self) -> GaitSolution:
         """The same as the end of a solve, e.g. for a run folder."""
@@ -142,7 +148,7 @@ class Resolver:
         start = start or self.optimum
         solver = GaitSolver(config)
         program = self._program_of(solver)
-        result = self._near.solve(program, start.result.unknowns, start.result.multipliers)
+        result = self._near.solve(program, *start.kkt.predicted(program))
         if insist and not result.converged and result.status != "stopped by the user":
             result = self._far.solve(program, start.result.unknowns)
         return Optimum(solver, program, result)

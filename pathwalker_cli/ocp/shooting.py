@@ -54,6 +54,9 @@ class ShootingProgram:
         shared = blocks.problem.shared.numel()
         self.program = BlockProgram(self.layout.size, occurrences, shared)
 
+    elimination = None
+    """Steps of unequal number do not make groups of one size; IPOPT's own solver finds an order."""
+
     @property
     def parameters(self) -> np.ndarray:
         """Parameter vector of the nonlinear program."""

@@ -47,6 +47,9 @@ _FADED = 0.02
 _BARRIER_SHARE = 1e-2
 """Barrier, as a share of the tolerance of the stage before, that a warm start begins with."""
 
+_MESHING = 1e-6
+"""Relative tolerance of the integrator that a mesh is refined by; errors to find are 1e-3."""
+
 StageObserver = Callable[[str, ProgressReport], None]
 
 
@@ -255,7 +258,7 @@ class GaitSolver:
         """Refine the mesh until an independent integrator agrees."""
         mesh, solver = self.config.mesh, self.config.solver
         tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
-        errors = self._reintegrated(program.to_motion(result.unknowns))
+        errors = self._reintegrated(program.to_motion(result.unknowns), _MESHING)
         for attempt in range(1, mesh.refinements + 1):
             done = _within(errors, tolerances) and tolerance <= solver.tolerance
             if not result.converged or done or self._interrupted:
@@ -265,8 +268,8 @@ class GaitSolver:
             name, before = f"refined {attempt}", (program, result)
             program, result = self._refined(name, start, before, tolerance)
             tolerance = solver.tolerance
-            errors = self._reintegrated(program.to_motion(result.unknowns))
-        return program, result, errors
+            errors = self._reintegrated(program.to_motion(result.unknowns), _MESHING)
+        return program, result, self._reintegrated(program.to_motion(result.unknowns))
 
     def _refined(
         self,
@@ -285,9 +288,9 @@ class GaitSolver:
         far = self.settings(solver.tolerance, solver.warm_barrier)
         return self.stage(f"{name} again", start, self.prediction, far)
 
-    def _reintegrated(self, motion: PhasedMotion) -> Reintegration:
+    def _reintegrated(self, motion: PhasedMotion, tolerance: float = 1e-9) -> Reintegration:
         began = time.perf_counter()
-        errors = reintegrate(self.walker, motion)
+        errors = reintegrate(self.walker, motion, tolerance)
         self.seconds["verify"] += time.perf_counter() - began
         return errors
 

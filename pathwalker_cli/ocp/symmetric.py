@@ -9,6 +9,9 @@ import qdldl
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, gmres, splu
 
+from pathwalker_cli.ocp.elimination import Elimination
+from pathwalker_cli.ocp.stage_ldl import stage_factors
+
 __all__ = ["SymmetricSystem"]
 
 _REGULARISATIONS: Final = (1e-8, 1e-7, 1e-6, 1e-5)
@@ -27,16 +30,23 @@ _GOOD_STEP: Final = 0.5
 class SymmetricSystem:
     """Factors of a symmetric matrix [[H, A'], [A, -D]] with D >= 0.
 
-    The factors L D L' are those of a slightly regularised matrix; refinement with the matrix itself
-    takes the regularisation out again.
+    The factors L D L' are those of the compiled solver, or those of a slightly regularised matrix.
+    Refinement with the matrix itself makes up for weak pivots and takes the regularisation out.
 
     Args:
         matrix: The matrix, shape (n, n).
         positive: Number of leading rows that belong to H.
+        elimination: A good order of elimination, for the compiled solver; without it, or where it
+            was not compiled, the matrix is regularised.
     """
 
-    def __init__(self, matrix: Any, positive: int) -> None:
+    def __init__(self, matrix: Any, positive: int, elimination: Elimination | None = None) -> None:
         self._matrix = sparse.csc_array(matrix)
+        compiled = stage_factors()
+        if elimination is not None and compiled is not None:
+            if compiled.factorise(self._matrix, elimination):
+                self._factors: Any = compiled
+                return
         size = self._matrix.shape[0]
         signs = np.where(np.arange(size) < positive, 1.0, -1.0)
         self._factors = _factors(self._matrix, signs)

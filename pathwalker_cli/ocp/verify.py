@@ -146,23 +146,32 @@ class Reintegration:
         return float(max(errors.max() for errors in self.velocity))
 
 
-def reintegrate(walker: Walker, motion: PhasedMotion) -> Reintegration:
-    """Integrate every mesh interval anew with DOP853 (relative tolerance 1e-9).
+def reintegrate(walker: Walker, motion: PhasedMotion, tolerance: float = 1e-9) -> Reintegration:
+    """Integrate every mesh interval anew with DOP853.
 
     Accelerations come from the contact-constrained dynamics of the walker, not from the
     unknowns of the program; activations follow from their rates.
+
+    Args:
+        walker: The walker.
+        motion: Its motion.
+        tolerance: Relative tolerance of the integrator.
     """
     n, torques = len(COORDINATES), actuator_torques(walker)
     positions, velocities = [], []
     for phase in motion.phases:
-        errors = _interval_errors(walker, torques, phase, motion.parameters)
+        errors = _interval_errors(walker, torques, phase, motion.parameters, tolerance)
         positions.append(errors[:, :n].max(axis=1))
         velocities.append(errors[:, n:].max(axis=1))
     return Reintegration(tuple(positions), tuple(velocities))
 
 
 def _interval_errors(
-    walker: Walker, torques: ca.Function, phase: PhaseMotion, stiffness: np.ndarray
+    walker: Walker,
+    torques: ca.Function,
+    phase: PhaseMotion,
+    stiffness: np.ndarray,
+    tolerance: float,
 ) -> np.ndarray:
     """Return the absolute errors of q and v at the end of every interval, shape (N, 20).
 
@@ -185,7 +194,12 @@ def _interval_errors(
 
     inside = 1 - 1e-12  # the end itself belongs to the next interval
     solution = solve_ivp(
-        rate, (0.0, inside), phase.states[:-1].ravel(), method="DOP853", rtol=1e-9, atol=1e-10
+        rate,
+        (0.0, inside),
+        phase.states[:-1].ravel(),
+        method="DOP853",
+        rtol=tolerance,
+        atol=0.1 * tolerance,
     )
     if not solution.success:
         return np.full((count, 2 * n), np.inf)
