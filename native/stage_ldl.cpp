@@ -34,6 +34,7 @@ constexpr int kTileRows = 2, kTileHeight = kTileRows * kWidth;
 constexpr int kPanel = 16;           // columns among which a pivot is looked for
 constexpr double kGoodPivot = 0.1;   // of the largest entry in its column: taken without a look further
 constexpr double kZero = 1e-20;      // no pivot is smaller
+constexpr int kMostDelayed = 100;    // columns without a pivot in one front: the matrix is singular
 
 typedef double Vector __attribute__((vector_size(8 * kWidth), aligned(8), may_alias));
 
@@ -315,6 +316,9 @@ class StageLdl {
   int delayed() const { return delayed_; }
   double operations() const { return operations_; }
   int count() const { return count_; }
+  int entries() const { return int(rows_.size()); }
+  const int* rows() const { return rows_.data(); }
+  const int* columns() const { return columns_.data(); }
 
   bool analysed(int n, int entries, const int* rows, const int* columns) {
     if (n != n_) return false;
@@ -327,7 +331,7 @@ class StageLdl {
     return true;
   }
 
-  // Factorise; false where a pivot is zero.
+  // Factorise; false where the matrix is singular, or so nearly that most columns lack a pivot.
   bool factorise(const double* values, double threshold) {
     negative_ = delayed_ = 0;
     ++count_;
@@ -518,7 +522,7 @@ class StageLdl {
     const double rest = size - factor.pivots, p = factor.pivots;
     operations_ += p * (rest * rest + rest * p + p * p / 3);
     if (group.border.empty()) give_back(update);
-    return !group.border.empty() || factor.pivots == candidates;
+    return candidates - factor.pivots <= (group.border.empty() ? 0 : kMostDelayed);
   }
 
   static void add(Front& front, int i, int j, double value) {
@@ -619,7 +623,55 @@ class StageLdl {
   vector<double> work_;
 };
 
+// IPOPT asks for factors of the plain matrix first and, where its inertia shows that the problem is
+// not convex there, of matrices with a growing shift.  Where the plain matrix was no use in the
+// iteration before, it hardly ever is: then it is not factorised but refused at once, though not more
+// than kMostSkips times in a row.  The shift decays anyway, so little is lost where it would have done.
+class Attempts {
+ public:
+  void reset() { *this = Attempts(); }
+
+  // Return whether these values are best refused unseen.
+  bool skip(int entries, const int* rows, const int* columns, const double* values) {
+    const bool again = repeated(entries, rows, columns, values);
+    if (again) {
+      plain_ = false;
+      return false;
+    }
+    const bool useless = !first_ && !(plain_ && accepted_);
+    first_ = false;
+    plain_ = true;
+    accepted_ = false;
+    if (useless && skips_ < kMostSkips) {
+      ++skips_;
+      plain_ = false;
+      return true;
+    }
+    skips_ = 0;
+    return false;
+  }
+
+  void accept() { accepted_ = true; }
+
+ private:
+  static constexpr int kMostSkips = 3;
+
+  // A shift changes the diagonal alone.
+  bool repeated(int entries, const int* rows, const int* columns, const double* values) {
+    last_.resize(entries);
+    bool same = !first_;
+    for (int e = 0; e < entries && same; ++e) same = rows[e] == columns[e] || last_[e] == values[e];
+    if (!same) std::copy_n(values, entries, last_.begin());
+    return same;
+  }
+
+  bool first_ = true, plain_ = true, accepted_ = true;
+  int skips_ = 0;
+  vector<double> last_;
+};
+
 thread_local StageLdl* current = nullptr;
+thread_local Attempts attempts;
 
 }  // namespace
 
@@ -664,12 +716,16 @@ EXPORT void ma57id_(double*, int*) {}
 EXPORT void ma57ad_(int* n, int* entries, const int* rows, const int* columns, int*, int*, int*, int*,
                     int* info, double*) {
   const bool known = current && current->analysed(*n, *entries, rows, columns);
+  attempts.reset();
   info[0] = known ? 0 : -1;
   info[8] = info[9] = 1;
 }
 
 EXPORT void ma57bd_(int*, int*, double* values, double*, int*, int*, int*, int*, int*, int*, int*,
                     double* control, int* info, double*) {
+  info[0] = 0;
+  info[23] = info[24] = current->size();  // of a refused matrix: more than there can be
+  if (attempts.skip(current->entries(), current->rows(), current->columns(), values)) return;
   const bool regular = current->factorise(values, control[0]);
   info[0] = regular ? 0 : 4;
   info[23] = current->negative();
@@ -678,6 +734,7 @@ EXPORT void ma57bd_(int*, int*, double* values, double*, int*, int*, int*, int*,
 
 EXPORT void ma57cd_(int*, int*, double*, int*, int*, int*, int* count, double* x, int*, double*, int*,
                     int*, int*, int* info) {
+  attempts.accept();
   for (int i = 0; i < *count; ++i) current->solve(x + std::size_t(i) * current->size());
   info[0] = 0;
 }

@@ -133,3 +133,12 @@ def test_ipopt_finds_the_same_with_mumps(solver: GaitSolver) -> None:
     assert ours.iterations == theirs.iterations
     assert ours.objective == pytest.approx(theirs.objective, rel=1e-4)
     assert ours.unknowns == pytest.approx(theirs.unknowns, abs=1e-3)
+
+
+def test_a_nearly_singular_matrix_does_not_take_for_ever() -> None:
+    rows = 400
+    matrix = sparse.block_array(
+        [[sparse.eye_array(100), None], [None, sparse.csc_array((rows, rows))]], format="csc"
+    )
+    order = Elimination(np.arange(500, dtype=np.int32), np.arange(50, 501, 50, dtype=np.int32))
+    assert not factors().factorise(matrix, order)

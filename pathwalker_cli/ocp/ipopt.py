@@ -24,6 +24,7 @@ __all__ = [
     "NlpSolver",
     "ProgressReport",
     "solve_program",
+    "warm_pushes",
 ]
 
 
@@ -70,18 +71,14 @@ class IpoptSettings:
             options["warm_start_init_point"] = "yes"
             # a start on a bound is moved off it by about what the barrier would ask for
             push = min(1e-4, 0.1 * self.initial_barrier)
-            for key in _WARM_PUSHES:
-                options[f"warm_start_{key}"] = push
+            options |= warm_pushes(push)
         return {**options, **self.extra}
 
 
-_WARM_PUSHES = (
-    "bound_push",
-    "bound_frac",
-    "slack_bound_push",
-    "slack_bound_frac",
-    "mult_bound_push",
-)
+def warm_pushes(distance: float) -> dict[str, Any]:
+    """Return options that move a warm start this far off its bounds [solver units]."""
+    kinds = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
+    return {f"warm_start_{kind}": distance for kind in kinds}
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from scipy import sparse
 
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.elimination import in_order_of, stage_keys
-from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult
+from pathwalker_cli.ocp.ipopt import NlpResult
 from pathwalker_cli.ocp.symmetric import SymmetricSystem
 
 __all__ = ["Answer", "KktSystem"]
@@ -50,13 +50,11 @@ class Answer:
         cost: Derivative of the optimal cost.
         unknowns: Derivative of the scaled unknowns, shape (n,).
         rows: Derivative of the multipliers of the rows, shape (m,).
-        bounds: Derivative of the multipliers of the bounds on the unknowns, shape (n,).
     """
 
     cost: float
     unknowns: np.ndarray
     rows: np.ndarray
-    bounds: np.ndarray
 
     def plus(self, other: Answer, amount: float) -> Answer:
         """Return the answer when another number changes with this one."""
@@ -64,7 +62,6 @@ class Answer:
             self.cost + amount * other.cost,
             self.unknowns + amount * other.unknowns,
             self.rows + amount * other.rows,
-            self.bounds + amount * other.bounds,
         )
 
 
@@ -126,19 +123,6 @@ class KktSystem:
         gone = (mine > _DOUBTFUL) & (theirs < 1.0 / _DOUBTFUL)
         come = (theirs > _DOUBTFUL) & (mine < 1.0 / _DOUBTFUL)
         return int((gone | come).sum())
-
-    def predicted(self, program: CollocationProgram) -> tuple[np.ndarray, Multipliers]:
-        """Return unknowns and multipliers of the optimum of other numbers, to first order.
-
-        Args:
-            program: The same program with other numbers.
-        """
-        answer, result = self.answer(self.program, program, 0.5), self.result
-        lower, upper = program.bounds
-        multipliers = Multipliers(
-            result.multipliers.unknowns + answer.bounds, result.multipliers.rows + answer.rows
-        )
-        return np.clip(result.unknowns + answer.unknowns, lower, upper), multipliers
 
     def answer(self, below: CollocationProgram, above: CollocationProgram, step: float) -> Answer:
         """Return the derivatives by a number of the problem; free parameters follow it.
@@ -251,8 +235,7 @@ class KktSystem:
         unknowns[self._moving] = solved[: len(self._moving)]
         rows = np.zeros(len(self.result.rows))
         rows[self._rows] = solved[len(self._moving) :]
-        bounds = -change.gradient - hessian @ unknowns - jacobian.T @ rows
-        return Answer(change.objective, unknowns, rows, bounds)
+        return Answer(change.objective, unknowns, rows)
 
     def _pull(self, answer: Answer) -> np.ndarray:
         """Return the derivatives of the gradient in the free parameters along an answer."""

@@ -24,8 +24,8 @@ __all__ = ["Optimum", "Resolver"]
 _WATCHDOG: Final = {"watchdog_shortened_iter_trigger": 1, "watchdog_trial_iter_max": 30}
 """A neighbour further off is reached by full steps that the filter alone would cut to nothing."""
 
-_NEAR_ITERATIONS: Final = 100
-"""Iterations after which a warm start is given up; most take about ten."""
+_NEAR_ITERATIONS: Final = 150
+"""Iterations after which a warm start is given up; most take about ten, far ones about fifty."""
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ class Resolver:
         start = start or self.optimum
         solver = GaitSolver(config)
         program = self._program_of(solver)
-        result = self._near.solve(program, *start.kkt.predicted(program))
+        result = self._near.solve(program, start.result.unknowns, start.result.multipliers)
         if insist and not result.converged and result.status != "stopped by the user":
             result = self._far.solve(program, start.result.unknowns)
         return Optimum(solver, program, result)

@@ -42,14 +42,18 @@ class SymmetricSystem:
 
     def __init__(self, matrix: Any, positive: int, elimination: Elimination | None = None) -> None:
         self._matrix = sparse.csc_array(matrix)
+        self._factors = self._compiled(elimination)
+        if self._factors is None:
+            size = self._matrix.shape[0]
+            signs = np.where(np.arange(size) < positive, 1.0, -1.0)
+            self._factors = _factors(self._matrix, signs)
+
+    def _compiled(self, elimination: Elimination | None) -> Any:
+        """Return the compiled solver with factors, or None where there are none."""
         compiled = stage_factors()
-        if elimination is not None and compiled is not None:
-            if compiled.factorise(self._matrix, elimination):
-                self._factors: Any = compiled
-                return
-        size = self._matrix.shape[0]
-        signs = np.where(np.arange(size) < positive, 1.0, -1.0)
-        self._factors = _factors(self._matrix, signs)
+        if compiled is None or elimination is None:
+            return None
+        return compiled if compiled.factorise(self._matrix, elimination) else None
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Return the solution for one right hand side, shape (n,)."""

@@ -13,6 +13,7 @@ from typing import Final
 
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.ocp.ipopt import warm_pushes
 from pathwalker_cli.output.run_folder import load_run
 from pathwalker_cli.studies.base import resolver_of
 from pathwalker_cli.studies.journal import STOPPED, Journal
@@ -21,26 +22,9 @@ from pathwalker_cli.studies.processes import end_with_parent
 
 __all__ = ["Job", "Solved", "for_far_neighbours", "solve_jobs"]
 
-_PUSHED: Final = (
-    "bound_push",
-    "bound_frac",
-    "slack_bound_push",
-    "slack_bound_frac",
-    "mult_bound_push",
-)
-
-_PUSH: Final = 1e-2
-"""How far a start is moved off bounds, in solver units: neighbours further off change which bounds
+_FAR: Final = {**warm_pushes(1e-2), "mu_init": 1e-5}
+"""Options of IPOPT for neighbours that differ in many numbers at once: these change which bounds
 are active, and from nearer the bounds steps are cut to a few per cent for dozens of iterations."""
-
-_FAR: Final[dict[str, float | int | str]] = {
-    **{f"warm_start_{key}": _PUSH for key in _PUSHED},
-    # full steps are tried for longer before the filter cuts them
-    "watchdog_shortened_iter_trigger": 1,
-    "watchdog_trial_iter_max": 30,
-}
-"""Options of IPOPT for neighbours that differ in many numbers at once: a quarter fewer iterations
-than without."""
 
 
 @dataclass(frozen=True)
