@@ -654,7 +654,7 @@ class Attempts {
   void accept() { accepted_ = true; }
 
  private:
-  static constexpr int kMostSkips = 3;
+  static constexpr int kMostSkips = 8;
 
   // A shift changes the diagonal alone.
   bool repeated(int entries, const int* rows, const int* columns, const double* values) {

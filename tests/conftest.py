@@ -39,6 +39,16 @@ def _no_network() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep derived functions apart from the user's, and share them between tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        base = tmp_path_factory.getbasetemp()
+        shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+        patch.setenv("PATHWALKER_CACHE", str(shared / "cache"))
+        yield
+
+
 def made_result() -> NlpResult:
     """Return the end of a nonlinear program of two unknowns and one row."""
     two, one = np.array([0.1, -0.2]), np.array([0.5])

@@ -435,6 +435,14 @@ def test_doctor_finds_everything() -> None:
         assert part in result.output
 
 
+def test_doctor_knows_the_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("PATHWALKER_CACHE", str(tmp_path))
+    (tmp_path / "tapes-1.npz").write_bytes(bytes(2_000_000))
+    assert f"{tmp_path}: 1 files, 2 MB" in run("doctor").output
+    monkeypatch.setenv("PATHWALKER_CACHE", "off")
+    assert "PATHWALKER_CACHE says so" in run("doctor").output
+
+
 def test_doctor_speaks_json() -> None:
     content = json.loads(run("doctor", "--json").output)
     assert content["usable"] is True

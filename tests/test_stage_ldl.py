@@ -125,7 +125,7 @@ def test_groups_are_small_whatever_the_mesh(solver: GaitSolver) -> None:
 def test_ipopt_finds_the_same_with_mumps(solver: GaitSolver) -> None:
     found = []
     for extra in ({}, {"linear_solver": "mumps"}):
-        config = solver.config.solver.model_copy(update={"ipopt": {"max_iter": 3, **extra}})
+        config = solver.config.solver.model_copy(update={"ipopt": {"max_iter": 1, **extra}})
         again = GaitSolver(solver.config.model_copy(update={"solver": config}))
         _, result = again._track()
         found.append(result)

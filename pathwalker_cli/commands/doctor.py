@@ -49,7 +49,7 @@ def doctor_command(context: click.Context, as_json: bool) -> None:
 
 def findings() -> tuple[Finding, ...]:
     """Look at everything; what breaks is reported instead of raised."""
-    parts = (_versions, _backends, _solver, _data)
+    parts = (_versions, _backends, _solver, _speed, _data)
     return tuple(finding for part in parts for finding in _looked_at(part))
 
 
@@ -96,6 +96,24 @@ def _solver() -> list[Finding]:
     ok = bool(solver.stats()["success"]) and abs(float(solution["x"]) - 1.0) < 1e-6
     detail = "solved a test problem" if ok else "failed on a test problem: install casadi again"
     return [Finding("IPOPT with MUMPS", ok, True, detail)]
+
+
+def _speed() -> list[Finding]:
+    from pathwalker_cli.ocp.kernels import kernels_path
+    from pathwalker_cli.ocp.tape_store import cache_folder
+
+    path, folder = kernels_path(), cache_folder()
+    slow = "none: solves take several times as long; install again with a C++ compiler at hand"
+    kernels = Finding("compiled kernels", path is not None, False, path.name if path else slow)
+    if folder is None:
+        return [
+            kernels,
+            Finding("derivatives cache", False, False, "off: PATHWALKER_CACHE says so"),
+        ]
+    files = list(folder.glob("tapes-*.npz")) if folder.is_dir() else []
+    size = sum(file.stat().st_size for file in files) / 1e6
+    detail = f"{folder}: {len(files)} files, {size:.0f} MB"
+    return [kernels, Finding("derivatives cache", True, False, detail)]
 
 
 def _data() -> list[Finding]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -39,6 +40,12 @@ class BezierChain:
     slopes: Sequence[Any]
     curviness: float
     newton_steps: int = _MOST_NEWTON_STEPS
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether the knots are tuples of plain numbers, so that the chain can be looked up."""
+        columns = (self.x, self.y, self.slopes)
+        return all(isinstance(k, tuple) and {*map(type, k)} <= {float} for k in columns)
 
     def corner(self, i: int) -> Any:
         """Return the x at which the end tangents of piece i meet; its middle if they coincide."""
@@ -76,13 +83,29 @@ def evaluate(chain: BezierChain, x: Any) -> BezierPoint:
     Returns:
         Value, slope and curvature, each shaped like x; exact to about 1e-14 of the knot values.
     """
+    if isinstance(x, ca.SX) and chain.is_numeric:
+        return BezierPoint(*_function(chain).call([x], True, False))
+    return _evaluated(chain, x)
+
+
+@lru_cache(maxsize=64)
+def _function(chain: BezierChain) -> ca.Function:
+    """Return the function x -> value, slope, curvature of a chain of numbers."""
+    x = ca.SX.sym("x")
+    point = _evaluated(chain, x)
+    return ca.Function("chain", [x], [point.value, point.slope, point.curvature])
+
+
+def _evaluated(chain: BezierChain, x: Any) -> BezierPoint:
+    """Return what `evaluate` does, operation by operation."""
     pieces = range(len(chain.x) - 1)
     controls = [chain.controls(i) for i in pieces]
     above, below = x > chain.x[-1], x < chain.x[0]
     inside = 1 - above - below
+    passed = [x >= edge for edge in chain.x[1:-1]]
 
     def pick(values: Sequence[Any]) -> Any:
-        return _step_sum(x, chain.x[1:-1], values)
+        return _step_sum(x, passed, values)
 
     x0, width = pick(chain.x[:-1]), pick([chain.x[i + 1] - chain.x[i] for i in pieces])
     y0, y5 = pick(chain.y[:-1]), pick(chain.y[1:])
@@ -102,22 +125,21 @@ def evaluate(chain: BezierChain, x: Any) -> BezierPoint:
 def newton_steps_for(chain: BezierChain, tolerance: float = 1e-14) -> int:
     """Return the Newton steps after which x(u) meets its target on every piece of a chain."""
     target = np.linspace(0.0, 1.0, 2001)
+    controls = np.array([chain.controls(i) for i in range(len(chain.x) - 1)])
+    a, b = controls[:, :1], controls[:, 1:]
+    u = target + 0 * a
     for steps in range(1, _MOST_NEWTON_STEPS):
-        error = 0.0
-        for i in range(len(chain.x) - 1):
-            a, b = chain.controls(i)
-            u = _invert(target, a, b, steps)
-            error = max(error, float(np.abs(_bernstein(u, 0, a, b, 1)[0] - target).max()))
-        if error < tolerance:
+        u = _newton_step(u, target, a, b)
+        if np.abs(_bernstein(u, 0, a, b, 1)[0] - target).max() < tolerance:
             return steps
     return _MOST_NEWTON_STEPS
 
 
-def _step_sum(x: Any, breaks: Sequence[Any], values: Sequence[Any]) -> Any:
-    """Return values[i] where breaks[i-1] <= x < breaks[i]: a sum of steps works for all types."""
+def _step_sum(x: Any, passed: Sequence[Any], values: Sequence[Any]) -> Any:
+    """Return values[i] where x has passed i edges: a sum of steps works for all types."""
     result = values[0] + 0 * x
-    for edge, before, after in zip(breaks, values[:-1], values[1:], strict=True):
-        result = result + (x >= edge) * (after - before)
+    for step, before, after in zip(passed, values[:-1], values[1:], strict=True):
+        result = result + step * (after - before)
     return result
 
 
@@ -139,8 +161,26 @@ def _bernstein(u: Any, p0: Any, a: Any, b: Any, p5: Any) -> tuple[Any, Any, Any]
 
 def _invert(target: Any, a: Any, b: Any, steps: int) -> Any:
     """Return u with x(u) = target on the scaled corner, by Newton's method."""
+    if isinstance(target, ca.SX):
+        (u,) = _inversion(steps).call([target, a, b], True, False)
+        return u
     u = target
     for _ in range(steps):
-        value, rate, _ = _bernstein(u, 0, a, b, 1)
-        u = u + (target - value) / rate
+        u = _newton_step(u, target, a, b)
     return u
+
+
+@lru_cache(maxsize=16)
+def _inversion(steps: int) -> ca.Function:
+    """Return the function (target, a, b) -> u: CasADi copies expressions faster than Python."""
+    target, a, b = (ca.SX.sym(name) for name in ("target", "a", "b"))
+    u = target
+    for _ in range(steps):
+        u = _newton_step(u, target, a, b)
+    return ca.Function("inversion", [target, a, b], [u])
+
+
+def _newton_step(u: Any, target: Any, a: Any, b: Any) -> Any:
+    """Return a better u for x(u) = target."""
+    value, rate, _ = _bernstein(u, 0, a, b, 1)
+    return u + (target - value) / rate

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
@@ -162,7 +163,12 @@ class Walker:
         return vdot[0], forces[0]
 
     def contact_dynamics_series(
-        self, phase: str | int | ContactPhase, q: np.ndarray, v: np.ndarray, tau: np.ndarray
+        self,
+        phase: str | int | ContactPhase,
+        q: np.ndarray,
+        v: np.ndarray,
+        tau: np.ndarray,
+        terms: Callable[[np.ndarray, np.ndarray], Sequence[Any]] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return `contact_dynamics` of m instants: vdot, shape (m, 10), and forces, shape (m, 8).
 
@@ -171,10 +177,11 @@ class Walker:
             q: Generalised coordinates [m, rad], shape (m, 10).
             v: Generalised velocities [m/s, rad/s], shape (m, 10).
             tau: Generalised forces [N, N m], shape (m, 10).
+            terms: What evaluates `dynamics_terms` at m points, if not the function itself.
         """
         active = list((phase if isinstance(phase, ContactPhase) else phase_named(phase)).indices)
         count, n, size = len(q), len(COORDINATES), len(active)
-        mass, bias, jacobian, drift = (np.asarray(k) for k in self._dynamics(q.T, v.T))
+        mass, bias, jacobian, drift = map(np.asarray, (terms or self.dynamics_terms)(q.T, v.T))
         # of m instants CasADi sets the matrices side by side
         jacobian = jacobian.reshape(-1, count, n)[active].swapaxes(0, 1)
         matrix = np.zeros((count, n + size, n + size))
@@ -195,7 +202,7 @@ class Walker:
         )
 
     @cached_property
-    def _dynamics(self) -> ca.Function:
+    def dynamics_terms(self) -> ca.Function:
         """Function (q, v) -> mass matrix, bias, point Jacobian, point acceleration at vdot = 0."""
         body, theta = self.rigid_body, self.rigid_body.parameters
         q, v = ca.SX.sym("q", body.nq), ca.SX.sym("v", body.nq)

@@ -42,18 +42,18 @@ class Part:
     """A block with its places in a program.
 
     Args:
-        functions: Its functions by kind.
+        patterns: Row and column of the nonzeros of every output, shape (nnz, 2) each, by kind.
         count: How often it occurs.
         sources: Unknowns, data, shared numbers, lam_f and lam_g.
     """
 
-    functions: Mapping[str, ca.Function]
+    patterns: Mapping[str, Sequence[np.ndarray]]
     count: int
     sources: tuple[Source, ...]
 
     def inputs(self, kind: str) -> tuple[Source, ...]:
         """Return where the inputs of the function of this kind come from."""
-        return self.sources[: self.functions[kind].n_in()]
+        return self.sources if kind == "hessian" else self.sources[:3]
 
     def places(self, kind: str, output: int) -> tuple[np.ndarray, np.ndarray]:
         """Return row and column of all nonzeros of an output, shape (nnz, count) each."""
@@ -63,9 +63,8 @@ class Part:
             "g": self.sources[-1].elements,
             "1": np.zeros((1, self.count), int),
         }
-        rows, columns = self.functions[kind].sparsity_out(output).get_triplet()
-        first = along[axes[0]][np.array(rows, int)]
-        second = along[axes[1]][np.array(columns, int)]
+        rows, columns = self.patterns[kind][output].T
+        first, second = along[axes[0]][rows], along[axes[1]][columns]
         if axes == "xx":
             return np.minimum(first, second), np.maximum(first, second)
         return first, second

@@ -18,7 +18,7 @@ from pathwalker_cli.ocp.assembly import KINDS, Assembly, Part, Source
 from pathwalker_cli.ocp.frozen import FrozenTerms
 from pathwalker_cli.ocp.kernels import kernels
 from pathwalker_cli.ocp.mapped import mapped_functions
-from pathwalker_cli.ocp.tape import Tape
+from pathwalker_cli.ocp.tape import Tape, patterns_of
 from pathwalker_cli.ocp.taped import taped_functions
 
 __all__ = ["Block", "BlockProgram", "Occurrences"]
@@ -81,7 +81,10 @@ class Block:
 
     @cached_property
     def tapes(self) -> dict[str, Tape] | None:
-        """Tapes of `values`, `jacobian` and `hessian`; None where one cannot be made."""
+        """Tapes of `values`, `jacobian` and `hessian`; None where one cannot be made.
+
+        `adopt` sets them where they are known already.
+        """
         tapes = {}
         for kind in KINDS:
             tape = Tape.of(getattr(self, kind))
@@ -89,6 +92,17 @@ class Block:
                 return None
             tapes[kind] = tape
         return tapes
+
+    def adopt(self, tapes: dict[str, Tape]) -> None:
+        """Take over tapes that were made of an equal block."""
+        self.__dict__["tapes"] = tapes
+
+    @property
+    def patterns(self) -> dict[str, tuple[np.ndarray, ...]]:
+        """Row and column of the nonzeros of every output, shape (nnz, 2) each, by kind."""
+        if self.tapes is not None:
+            return {kind: tape.patterns for kind, tape in self.tapes.items()}
+        return {kind: patterns_of(getattr(self, kind)) for kind in KINDS}
 
     @cached_property
     def _first_derivatives(self) -> list[ca.SX]:
@@ -221,13 +235,14 @@ class BlockProgram:
         tapes = [o.block.tapes for o in self.occurrences] if kernels() is not None else [None]
         known = [of_block for of_block in tapes if of_block is not None]
         if len(known) < len(tapes):
-            return mapped_functions(self._assembly)
+            blocks = [{k: getattr(o.block, k) for k in KINDS} for o in self.occurrences]
+            return mapped_functions(self._assembly, blocks)
         return taped_functions(self._assembly, known)
 
     @cached_property
     def _assembly(self) -> Assembly:
         parts = [
-            Part({kind: getattr(o.block, kind) for kind in KINDS}, o.count, self._sources(i, o))
+            Part(o.block.patterns, o.count, self._sources(i, o))
             for i, o in enumerate(self.occurrences)
         ]
         return Assembly(self.size, int(self._data_offsets[-1]), self.rows, parts)

@@ -60,6 +60,13 @@ class CollocationBlocks:
         self.boundary = boundary_block(problem, problem.controls)
         self.sample = self._sample_block()
 
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """All blocks that matter, in a fixed order."""
+        phases = [(p.residual, p.path, p.end, p.interval) for p in self.phases]
+        every = [block for blocks in phases for block in blocks]
+        return tuple(b for b in (*every, self.node, self.boundary, self.sample) if b.matters)
+
     def _point_block(self, phase: Phase, rows: Rows, label: str) -> Block:
         """Return rows at one collocation point; unknowns T, p, x, z, y0, u0, u1."""
         problem = self.problem

@@ -65,8 +65,8 @@ class IpoptSettings:
             "mumps_pivtol": 1e-4,
         }
         if not self.warm_start:
-            # barrier problems are only a path to the solution: following them loosely is enough
-            options |= {"barrier_tol_factor": 100.0, "mu_linear_decrease_factor": 0.05}
+            # barrier problems are only a path to the solution: few of them are enough
+            options["mu_linear_decrease_factor"] = 0.05
         else:
             options["warm_start_init_point"] = "yes"
             # a start on a bound is moved off it by about what the barrier would ask for

@@ -15,10 +15,23 @@ _SHARED = (2, 3)
 """Inputs of a block that are the same at all occurrences: shared numbers and lam_f."""
 
 
-def mapped_functions(assembly: Assembly) -> dict[str, ca.Function]:
-    """Return the functions of a program, block functions mapped over all occurrences."""
+def mapped_functions(
+    assembly: Assembly, blocks: Sequence[Mapping[str, ca.Function]]
+) -> dict[str, ca.Function]:
+    """Return the functions of a program, block functions mapped over all occurrences.
+
+    Args:
+        assembly: The program.
+        blocks: Functions of all kinds by block.
+    """
     symbols = {name: ca.MX.sym(name, size) for name, size in assembly.arguments.items()}
-    outputs = {kind: [_outputs(p, kind, symbols) for p in assembly.parts] for kind in KINDS}
+    outputs = {
+        kind: [
+            _outputs(part, kind, block[kind], symbols)
+            for part, block in zip(assembly.parts, blocks, strict=True)
+        ]
+        for kind in KINDS
+    }
     functions = {}
     for name, (arguments, results) in FUNCTIONS.items():
         expressions = [
@@ -30,9 +43,10 @@ def mapped_functions(assembly: Assembly) -> dict[str, ca.Function]:
     return functions
 
 
-def _outputs(part: Part, kind: str, symbols: Mapping[str, ca.MX]) -> list[ca.MX]:
+def _outputs(
+    part: Part, kind: str, function: ca.Function, symbols: Mapping[str, ca.MX]
+) -> list[ca.MX]:
     """Return the outputs of a block, those of all occurrences side by side."""
-    function = part.functions[kind]
     inputs = [
         ca.reshape(symbols[source.argument][source.elements.ravel("F").tolist()],
                    *source.elements.shape)

@@ -11,6 +11,7 @@ from typing import Final
 
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.gait import GaitProblem
+from pathwalker_cli.ocp.tape_store import keep_tapes, kept_tapes
 
 __all__ = ["gait_blocks"]
 
@@ -26,5 +27,20 @@ def gait_blocks(gait: GaitProblem, degree: int) -> CollocationBlocks:
     """
     key = (gait.structure, degree)
     if key not in _BUILT:
-        _BUILT[key] = CollocationBlocks(gait.build(), degree)
+        blocks = CollocationBlocks(gait.build(), degree)
+        _give_tapes(blocks, key)
+        _BUILT[key] = blocks
     return _BUILT[key]
+
+
+def _give_tapes(blocks: CollocationBlocks, key: Hashable) -> None:
+    """Give blocks the tapes that another process made of equal ones, or keep theirs for others."""
+    kept = kept_tapes(key)
+    if kept is not None:
+        for block, tapes in zip(blocks.blocks, kept, strict=True):
+            block.adopt(tapes)
+        return
+    made = [block.tapes for block in blocks.blocks]
+    known = [tapes for tapes in made if tapes is not None]
+    if len(known) == len(made):
+        keep_tapes(key, known)

@@ -15,7 +15,7 @@ import numpy as np
 
 from pathwalker_cli.ocp.kernels import kernels
 
-__all__ = ["CONST", "INPUT", "LANES", "OPERATIONS", "OUTPUT", "Tape"]
+__all__ = ["CONST", "INPUT", "LANES", "OPERATIONS", "OUTPUT", "Tape", "patterns_of"]
 
 LANES: Final = 8
 """Occurrences that the interpreter works on at a time."""
@@ -48,12 +48,14 @@ class Tape:
         registers: Number of registers.
         inputs: Input and nonzero of it that every row of a gather table reads, shape (k, 2).
         outputs: Output and nonzero of it that every row of a scatter table adds to, shape (l, 2).
+        patterns: Row and column of every nonzero of every output, shape (nnz, 2) each.
     """
 
     code: np.ndarray
     registers: int
     inputs: np.ndarray
     outputs: np.ndarray
+    patterns: tuple[np.ndarray, ...]
 
     @classmethod
     def of(cls, function: ca.Function) -> Tape | None:
@@ -74,7 +76,15 @@ class Tape:
         inputs, outputs = code[reads][:, [2, 3]], code[writes][:, [1, 3]]
         code[reads, 3] = np.arange(len(inputs))
         code[writes, 3] = np.arange(len(outputs))
-        return cls(*_scheduled(library, code), inputs, outputs)
+        return cls(*_scheduled(library, code), inputs, outputs, patterns_of(function))
+
+
+def patterns_of(function: ca.Function) -> tuple[np.ndarray, ...]:
+    """Return row and column of every nonzero of every output, shape (nnz, 2) each."""
+    return tuple(
+        np.array(function.sparsity_out(k).get_triplet(), np.int32).T.reshape(-1, 2)
+        for k in range(function.n_out())
+    )
 
 
 def _scheduled(library: ctypes.CDLL, code: np.ndarray) -> tuple[np.ndarray, int]:

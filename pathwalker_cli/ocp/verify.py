@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
@@ -16,6 +15,7 @@ from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.ipopt import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.ocp.series import GaitSeries, actuator_torques
+from pathwalker_cli.ocp.taped import Columns
 
 __all__ = [
     "ActiveBound",
@@ -157,10 +157,11 @@ def reintegrate(walker: Walker, motion: PhasedMotion, tolerance: float = 1e-9) -
         motion: Its motion.
         tolerance: Relative tolerance of the integrator.
     """
-    n, torques = len(COORDINATES), actuator_torques(walker)
+    n, torques = len(COORDINATES), Columns(actuator_torques(walker))
+    terms = Columns(walker.dynamics_terms)
     positions, velocities = [], []
     for phase in motion.phases:
-        errors = _interval_errors(walker, torques, phase, motion.parameters, tolerance)
+        errors = _interval_errors(walker, torques, terms, phase, motion.parameters, tolerance)
         positions.append(errors[:, :n].max(axis=1))
         velocities.append(errors[:, n:].max(axis=1))
     return Reintegration(tuple(positions), tuple(velocities))
@@ -168,7 +169,8 @@ def reintegrate(walker: Walker, motion: PhasedMotion, tolerance: float = 1e-9) -
 
 def _interval_errors(
     walker: Walker,
-    torques: ca.Function,
+    torques: Columns,
+    terms: Columns,
     phase: PhaseMotion,
     stiffness: np.ndarray,
     tolerance: float,
@@ -189,7 +191,7 @@ def _interval_errors(
         tau = np.zeros((n, count))
         np.add.at(tau, list(GENERATOR_ROWS), np.asarray(muscle))
         np.add.at(tau, list(ANKLES), np.asarray(orthosis))
-        vdot, _ = walker.contact_dynamics_series(phase.name, q, v, tau.T)
+        vdot, _ = walker.contact_dynamics_series(phase.name, q, v, tau.T, terms)
         return np.asarray(phase.duration * steps[:, None] * np.hstack([v, vdot])).ravel()
 
     inside = 1 - 1e-12  # the end itself belongs to the next interval
