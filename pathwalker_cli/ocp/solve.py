@@ -245,6 +245,7 @@ class GaitSolver:
         costs = len(self.gait.integrals)
         motion = stride.motion(self.walker, stiffness, meshes, config.mesh.degree, costs)
         settings = self.settings(_TRACKING_TOLERANCE, _TRACKING_BARRIER)
+        settings = replace(settings, extra={"barrier_tol_factor": 100.0, **settings.extra})
         numbers = self.numbers(_TRACKING, table, _FADED)
         return self.stage("tracking", motion, numbers, settings)
 
