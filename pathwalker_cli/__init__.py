@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,9 @@ if TYPE_CHECKING:
     from pathwalker_cli.patient import load_patient
 
 __all__ = ["__version__", "build_walker", "load_patient"]
+
+IMPORTED_AT = time.time()
+"""When this process began to read the sources of the package [s since 1970]."""
 
 _HOMES = {
     "build_walker": "pathwalker_cli.model.walker",

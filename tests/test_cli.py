@@ -437,7 +437,7 @@ def test_doctor_finds_everything() -> None:
 
 def test_doctor_knows_the_cache(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATHWALKER_CACHE", str(tmp_path))
-    (tmp_path / "tapes-1.npz").write_bytes(bytes(2_000_000))
+    (tmp_path / "1.tapes").write_bytes(bytes(2_000_000))
     assert f"{tmp_path}: 1 files, 2 MB" in run("doctor").output
     monkeypatch.setenv("PATHWALKER_CACHE", "off")
     assert "PATHWALKER_CACHE says so" in run("doctor").output

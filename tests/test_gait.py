@@ -14,7 +14,9 @@ from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.io.recordings import read_recording
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.ocp import mesh as meshing
+from pathwalker_cli.ocp.blocks import Block
 from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.gait_bounds import gait_bounds
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.series import actuator_torques
@@ -53,7 +55,8 @@ def test_phases_touch_down_and_lift_off_once() -> None:
 
 def test_frozen_curves_give_the_torques_and_their_derivatives(solver: GaitSolver) -> None:
     """Residuals of the blocks against plain expressions, by value and by finite difference."""
-    block = solver.blocks.phases[4].residual
+    block = CollocationBlocks(solver.gait.build(), solver.blocks.degree).phases[4].residual
+    assert isinstance(block, Block)
     rng = np.random.default_rng(5)
     x = 0.3 * rng.normal(size=block.unknowns.numel())
     data = np.concatenate([[0.1, 0.5], np.zeros(10)])

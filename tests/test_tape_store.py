@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 from pathlib import Path
@@ -9,9 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import pathwalker_cli
 from pathwalker_cli.config import load_config
+from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp import tape_store
-from pathwalker_cli.ocp.kernels import kernels
+from pathwalker_cli.ocp.assembly import KINDS
+from pathwalker_cli.ocp.blocks import Block, KeptBlock
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.kernels import kernels, kernels_path
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.ocp.structures import gait_blocks
 from pathwalker_cli.ocp.tape import Tape
@@ -40,7 +46,7 @@ def same(a: Tape, b: Tape) -> bool:
     return a.registers == b.registers and all(map(np.array_equal, *arrays))
 
 
-BLOCKS = [{"values": tape(1), "hessian": tape(2)}, {"values": tape(3)}]
+BLOCKS = {"a": (4, {"values": tape(1), "hessian": tape(2)}), "b": (0, {"values": tape(3)})}
 
 
 def file_of(folder: Path) -> Path:
@@ -53,9 +59,10 @@ def test_what_was_kept_is_found_again(folder: Path) -> None:
     keep_tapes("a", BLOCKS)
     found = kept_tapes("a")
     assert found is not None
-    assert [list(block) for block in found] == [list(block) for block in BLOCKS]
-    for block, again in zip(BLOCKS, found, strict=True):
-        assert all(same(block[kind], again[kind]) for kind in block)
+    assert list(found) == list(BLOCKS)
+    for name, (rows, tapes) in BLOCKS.items():
+        assert found[name][0] == rows
+        assert all(same(tapes[kind], found[name][1][kind]) for kind in tapes)
     assert kept_tapes("b") is None
 
 
@@ -65,23 +72,67 @@ def test_other_code_or_versions_find_nothing(folder: Path, monkeypatch: pytest.M
     assert kept_tapes("a") is None
 
 
-def test_all_sources_of_problems_are_in_the_name() -> None:
-    names = {path.name for path in tape_store._maker_files()}
-    assert {"conventions.py", "gait.py", "curves.py", "frozen.py", "tape.py", "blocks.py"} <= names
-    assert "libkernels-generic.so" in names
+def test_other_versions_have_another_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [tape_store._makers.__wrapped__()]
+    for library in (np, tape_store.pin):
+        monkeypatch.setattr(library, "__version__", "0.0")
+        names.append(tape_store._makers.__wrapped__())
+    assert None not in names
+    assert len(set(names)) == 3
 
 
-@pytest.mark.parametrize("harm", ["truncated", "flipped", "empty", "foreign", "folder"])
+def test_sources_and_libraries_are_in_the_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    package = Path(pathwalker_cli.__file__).parent
+    files = list(tape_store._maker_files(package))
+    assert {*package.rglob("*.py")} < {*files}
+    assert {file.name for file in files if file.suffix == ".so"} == {
+        kernels_path().name,
+        "libpinocchio_casadi.so",
+    }
+    before = tape_store._makers.__wrapped__()
+    read = Path.read_bytes
+    end = {files[3]: b"# changed"}
+    monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + end.get(path, b""))
+    assert tape_store._makers.__wrapped__() not in (before, None)
+
+
+def test_other_structures_have_another_name(folder: Path) -> None:
+    solvers = [GaitSolver(load_config(name)) for name in ("mapd-barefoot", "mapd-orthosis")]
+    keys = [(solver.gait.structure, degree) for solver in solvers for degree in (3, 4)]
+    assert len({tape_store._path(key) for key in keys}) == 4
+    again = GaitSolver(load_config("mapd-barefoot", changes=("bounds.friction=0.3",)))
+    assert tape_store._path((again.gait.structure, 3)) == tape_store._path(keys[0])
+
+
+def test_sources_that_changed_under_a_process_are_not_trusted(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What runs may be what the file was, so that nothing must be kept under its new name."""
+    monkeypatch.setattr(tape_store, "_makers", tape_store._makers.__wrapped__)
+    keep_tapes("a", BLOCKS)
+    assert kept_tapes("a") is not None
+    monkeypatch.setattr(pathwalker_cli, "IMPORTED_AT", Path(__file__).stat().st_ctime - 1e9)
+    assert kept_tapes("a") is None
+    keep_tapes("b", BLOCKS)
+    assert len(list(folder.iterdir())) == 1
+
+
+@pytest.mark.parametrize("harm", ["truncated", "flipped", "empty", "foreign", "moved", "folder"])
 def test_a_damaged_file_is_made_again(folder: Path, harm: str) -> None:
     keep_tapes("a", BLOCKS)
     file = file_of(folder)
     content = bytearray(file.read_bytes())
     if harm == "flipped":
-        content[content.index(b"numbers.npy") + 200] ^= 0xFF
+        content[len(content) // 2] ^= 0x10
     elif harm == "truncated":
         content = content[: len(content) // 2]
     elif harm == "foreign":
-        content = bytearray(b"not an archive")
+        content = bytearray(b"not tapes")
+    elif harm == "moved":
+        file.unlink()
+        keep_tapes("b", BLOCKS)
+        file_of(folder).rename(file)
+        content = bytearray(file.read_bytes())
     file.unlink()
     if harm == "folder":
         file.mkdir()
@@ -91,6 +142,15 @@ def test_a_damaged_file_is_made_again(folder: Path, harm: str) -> None:
     keep_tapes("a", BLOCKS)
     assert (kept_tapes("a") is None) == (harm == "folder")
     assert list(folder.iterdir()) == [file]
+
+
+def test_any_flipped_byte_is_noticed(folder: Path) -> None:
+    keep_tapes("a", BLOCKS)
+    file = file_of(folder)
+    content = file.read_bytes()
+    for i in range(len(content)):
+        file.write_bytes(content[:i] + bytes([content[i] ^ 0x81]) + content[i + 1 :])
+        assert kept_tapes("a") is None
 
 
 @pytest.mark.parametrize("value", ["", "off"])
@@ -106,7 +166,10 @@ def test_the_user_s_cache_is_the_default(monkeypatch: pytest.MonkeyPatch, tmp_pa
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache_folder() == tmp_path / "pathwalker"
     monkeypatch.delenv("XDG_CACHE_HOME")
-    assert cache_folder() == Path.home() / ".cache" / "pathwalker"
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    assert cache_folder() == tmp_path / "home" / ".cache" / "pathwalker"
+    monkeypatch.setattr(os.path, "expanduser", lambda path: path)  # nobody's home
+    assert cache_folder() is None
 
 
 def test_a_folder_that_cannot_be_written_does_no_harm(
@@ -116,6 +179,15 @@ def test_a_folder_that_cannot_be_written_does_no_harm(
     monkeypatch.setenv("PATHWALKER_CACHE", str(tmp_path / "file" / "cache"))
     keep_tapes("a", BLOCKS)
     assert kept_tapes("a") is None
+
+
+def test_a_full_disk_does_no_harm(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*paths: object) -> None:
+        raise OSError(errno.ENOSPC, "no space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    keep_tapes("a", BLOCKS)
+    assert list(folder.iterdir()) == []
 
 
 def test_only_the_files_used_last_stay(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,15 +220,20 @@ def test_processes_that_start_at_once_do_not_disturb_each_other(folder: Path) ->
 def test_a_further_process_derives_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     config = load_config("mapd-barefoot", changes=("mesh.intervals=16",))
     solver = GaitSolver(config)
-    made = gait_blocks.__globals__["_BUILT"]
     monkeypatch.setitem(gait_blocks.__globals__, "_BUILT", {})
     first = gait_blocks(solver.gait, 3)
-    assert file_of(folder).suffix == ".npz"
+    assert file_of(folder).suffix == ".tapes"
     monkeypatch.setitem(gait_blocks.__globals__, "_BUILT", {})
     monkeypatch.setattr(Tape, "of", lambda function: pytest.fail("derived again"))
+    monkeypatch.setattr(Block, "_function", lambda *inputs: pytest.fail("built again"))
     again = gait_blocks(solver.gait, 3)
+    meshes = meshing.first(solver.stride.durations, config.mesh)
+    CollocationProgram(again, solver.prediction, meshes).program.functions()
+    monkeypatch.undo()
     for block, other in zip(first.blocks, again.blocks, strict=True):
-        assert block.tapes is not None
-        assert other.tapes is not None
-        assert all(same(block.tapes[kind], other.tapes[kind]) for kind in block.tapes)
-    assert made is not None
+        assert isinstance(block, Block)
+        assert isinstance(other, KeptBlock)
+        assert (block.name, block.rows, block.matters) == (other.name, other.rows, other.matters)
+        for kind in KINDS if block.matters else ():
+            assert same(block.tapes[kind], other.tapes[kind])
+            assert block.functions[kind].serialize() == other.functions[kind].serialize()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -121,6 +122,22 @@ def test_curves_are_smooth_to_the_second_derivative(name: str) -> None:
         at_knots = evaluate(chain, np.array(chain.x))
         assert at_knots.value == pytest.approx(chain.y, abs=1e-12)
         assert at_knots.curvature == pytest.approx(np.zeros(len(chain.x)), abs=1e-6)
+
+
+@pytest.mark.parametrize("name", GENERATORS)
+def test_symbolic_curves_are_the_numeric_ones(name: str) -> None:
+    for chain in (curves_of(name).active_torque_angle, curves_of(name).torque_angular_velocity):
+        values = np.linspace(chain.x[0] - 0.3, chain.x[-1] + 0.3, 801)
+        x, lists = ca.SX.sym("x"), replace(chain, x=[*chain.x], y=[*chain.y])
+        for same in (chain, lists):  # looked up, and built anew
+            point = ca.Function("point", [x], [*vars(evaluate(same, x)).values()])
+            for got, wanted in zip(
+                point(values), vars(evaluate(chain, values)).values(), strict=True
+            ):
+                scale = np.abs(wanted).max()
+                assert np.asarray(got).ravel() == pytest.approx(
+                    wanted, rel=1e-12, abs=1e-12 * scale
+                )
 
 
 def test_excitation_is_the_inverse_of_the_activation_rate() -> None:

@@ -100,7 +100,7 @@ def _solver() -> list[Finding]:
 
 def _speed() -> list[Finding]:
     from pathwalker_cli.ocp.kernels import kernels_path
-    from pathwalker_cli.ocp.tape_store import cache_folder
+    from pathwalker_cli.ocp.tape_store import cache_folder, kept_files
 
     path, folder = kernels_path(), cache_folder()
     slow = "none: solves take several times as long; install again with a C++ compiler at hand"
@@ -110,7 +110,7 @@ def _speed() -> list[Finding]:
             kernels,
             Finding("derivatives cache", False, False, "off: PATHWALKER_CACHE says so"),
         ]
-    files = list(folder.glob("tapes-*.npz")) if folder.is_dir() else []
+    files = kept_files(folder)
     size = sum(file.stat().st_size for file in files) / 1e6
     detail = f"{folder}: {len(files)} files, {size:.0f} MB"
     return [kernels, Finding("derivatives cache", True, False, detail)]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -85,21 +85,38 @@ def evaluate(chain: BezierChain, x: Any) -> BezierPoint:
     """
     if isinstance(x, ca.SX) and chain.is_numeric:
         return BezierPoint(*_function(chain).call([x], True, False))
-    return _evaluated(chain, x)
+    controls = [chain.controls(i) for i in range(len(chain.x) - 1)]
+    return _evaluated(chain, controls, x)
 
 
 @lru_cache(maxsize=64)
 def _function(chain: BezierChain) -> ca.Function:
     """Return the function x -> value, slope, curvature of a chain of numbers."""
     x = ca.SX.sym("x")
-    point = _evaluated(chain, x)
-    return ca.Function("chain", [x], [point.value, point.slope, point.curvature])
+    controls = [chain.controls(i) for i in range(len(chain.x) - 1)]
+    inputs = [chain.x, chain.y, chain.slopes, *zip(*controls, strict=True)]
+    general = _any_chain(len(chain.x), chain.newton_steps)
+    return ca.Function("chain", [x], general.call([x, *map(ca.SX, inputs)], True, False))
 
 
-def _evaluated(chain: BezierChain, x: Any) -> BezierPoint:
-    """Return what `evaluate` does, operation by operation."""
-    pieces = range(len(chain.x) - 1)
-    controls = [chain.controls(i) for i in pieces]
+@lru_cache(maxsize=16)
+def _any_chain(knots: int, newton_steps: int) -> ca.Function:
+    """Return the function of x, knots and inner control points -> value, slope, curvature.
+
+    CasADi copies expressions, and folds what is constant, faster than Python writes them.
+    """
+    x = ca.SX.sym("x")
+    inputs = [ca.SX.sym(name, knots) for name in ("x", "y", "slopes")]
+    inputs += [ca.SX.sym(name, knots - 1) for name in "ab"]
+    xs, ys, slopes, a, b = map(ca.vertsplit, inputs)
+    chain = BezierChain(xs, ys, slopes, np.nan, newton_steps)  # a and b know the curviness
+    point = _evaluated(chain, list(zip(a, b, strict=True)), x)
+    return ca.Function("chain", [x, *inputs], [point.value, point.slope, point.curvature])
+
+
+def _evaluated(chain: BezierChain, controls: Sequence[tuple[Any, Any]], x: Any) -> BezierPoint:
+    """Return the curve at x by the inner control points of its pieces."""
+    pieces = range(len(controls))
     above, below = x > chain.x[-1], x < chain.x[0]
     inside = 1 - above - below
     passed = [x >= edge for edge in chain.x[1:-1]]
@@ -161,26 +178,21 @@ def _bernstein(u: Any, p0: Any, a: Any, b: Any, p5: Any) -> tuple[Any, Any, Any]
 
 def _invert(target: Any, a: Any, b: Any, steps: int) -> Any:
     """Return u with x(u) = target on the scaled corner, by Newton's method."""
-    if isinstance(target, ca.SX):
-        (u,) = _inversion(steps).call([target, a, b], True, False)
-        return u
+    step = _symbolic_newton_step() if isinstance(target, ca.SX) else _newton_step
     u = target
     for _ in range(steps):
-        u = _newton_step(u, target, a, b)
+        u = step(u, target, a, b)
     return u
-
-
-@lru_cache(maxsize=16)
-def _inversion(steps: int) -> ca.Function:
-    """Return the function (target, a, b) -> u: CasADi copies expressions faster than Python."""
-    target, a, b = (ca.SX.sym(name) for name in ("target", "a", "b"))
-    u = target
-    for _ in range(steps):
-        u = _newton_step(u, target, a, b)
-    return ca.Function("inversion", [target, a, b], [u])
 
 
 def _newton_step(u: Any, target: Any, a: Any, b: Any) -> Any:
     """Return a better u for x(u) = target."""
     value, rate, _ = _bernstein(u, 0, a, b, 1)
     return u + (target - value) / rate
+
+
+@cache
+def _symbolic_newton_step() -> ca.Function:
+    """Return `_newton_step` as a function: CasADi copies expressions faster than Python."""
+    inputs = [ca.SX.sym(name) for name in ("u", "target", "a", "b")]
+    return ca.Function("newton_step", inputs, [_newton_step(*inputs)], {"always_inline": True})

@@ -7,7 +7,7 @@ derivatives of the whole.  Building therefore costs the same on every mesh.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from pathwalker_cli.ocp.mapped import mapped_functions
 from pathwalker_cli.ocp.tape import Tape, patterns_of
 from pathwalker_cli.ocp.taped import taped_functions
 
-__all__ = ["Block", "BlockProgram", "Occurrences"]
+__all__ = ["Block", "BlockProgram", "KeptBlock", "Occurrences"]
 
 
 @dataclass(frozen=True)
@@ -81,10 +81,7 @@ class Block:
 
     @cached_property
     def tapes(self) -> dict[str, Tape] | None:
-        """Tapes of `values`, `jacobian` and `hessian`; None where one cannot be made.
-
-        `adopt` sets them where they are known already.
-        """
+        """Tapes of `values`, `jacobian` and `hessian`; None where one cannot be made."""
         tapes = {}
         for kind in KINDS:
             tape = Tape.of(getattr(self, kind))
@@ -93,16 +90,17 @@ class Block:
             tapes[kind] = tape
         return tapes
 
-    def adopt(self, tapes: dict[str, Tape]) -> None:
-        """Take over tapes that were made of an equal block."""
-        self.__dict__["tapes"] = tapes
+    @cached_property
+    def functions(self) -> dict[str, ca.Function]:
+        """The functions by kind."""
+        return {kind: getattr(self, kind) for kind in KINDS}
 
     @property
     def patterns(self) -> dict[str, tuple[np.ndarray, ...]]:
         """Row and column of the nonzeros of every output, shape (nnz, 2) each, by kind."""
         if self.tapes is not None:
             return {kind: tape.patterns for kind, tape in self.tapes.items()}
-        return {kind: patterns_of(getattr(self, kind)) for kind in KINDS}
+        return {kind: patterns_of(function) for kind, function in self.functions.items()}
 
     @cached_property
     def _first_derivatives(self) -> list[ca.SX]:
@@ -118,6 +116,38 @@ class Block:
         outer = ca.Function("frozen", [*inputs, self.frozen.symbol_vector], outputs)
         results = outer.call([*inputs, self.frozen.meaning_vector], True, False)
         return ca.Function(name, inputs, results)
+
+
+@dataclass(frozen=True)
+class KeptBlock:
+    """A block whose tapes are known; its expressions are built only if somebody asks for functions.
+
+    Args:
+        name: Name for reports.
+        rows: Number of constraint rows.
+        tapes: Tapes of `values`, `jacobian` and `hessian`; none of a block that does not matter.
+        build: Returns the block itself.
+    """
+
+    name: str
+    rows: int
+    tapes: dict[str, Tape]
+    build: Callable[[], Block]
+
+    @property
+    def matters(self) -> bool:
+        """Whether the block has rows or adds to the objective."""
+        return bool(self.tapes)
+
+    @property
+    def patterns(self) -> dict[str, tuple[np.ndarray, ...]]:
+        """Row and column of the nonzeros of every output, shape (nnz, 2) each, by kind."""
+        return {kind: tape.patterns for kind, tape in self.tapes.items()}
+
+    @cached_property
+    def functions(self) -> dict[str, ca.Function]:
+        """The functions by kind."""
+        return self.build().functions
 
 
 @dataclass(frozen=True)
@@ -138,7 +168,7 @@ class Occurrences:
         series: Rows of the same series sample one function of time; r names.
     """
 
-    block: Block
+    block: Block | KeptBlock
     columns: np.ndarray
     data: np.ndarray
     lower: np.ndarray
@@ -212,7 +242,7 @@ class BlockProgram:
         instance, local = divmod(row - self._row_offsets[which], occurrence.block.rows)
         return occurrence.row_names[local], occurrence.labels[instance]
 
-    def rows_of(self, block: Block) -> np.ndarray:
+    def rows_of(self, block: Block | KeptBlock) -> np.ndarray:
         """Return the rows of g that a block stands for, shape (rows, occurrences)."""
         i = next(i for i, o in enumerate(self.occurrences) if o.block is block)
         shape = (block.rows, self.occurrences[i].count)
@@ -235,8 +265,7 @@ class BlockProgram:
         tapes = [o.block.tapes for o in self.occurrences] if kernels() is not None else [None]
         known = [of_block for of_block in tapes if of_block is not None]
         if len(known) < len(tapes):
-            blocks = [{k: getattr(o.block, k) for k in KINDS} for o in self.occurrences]
-            return mapped_functions(self._assembly, blocks)
+            return mapped_functions(self._assembly, [o.block.functions for o in self.occurrences])
         return taped_functions(self._assembly, known)
 
     @cached_property

@@ -6,15 +6,18 @@ smooth states and controls at the nodes.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.ocp.blocks import Block
+from pathwalker_cli.ocp.blocks import Block, KeptBlock
 from pathwalker_cli.ocp.frozen import FrozenTerms
 from pathwalker_cli.ocp.phased import collocation_times, lagrange_weights, quadrature_weights
-from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Rows
+from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase
+from pathwalker_cli.ocp.tape import Tape
 from pathwalker_cli.ocp.unknowns import Unknown, boundary_block
 
 __all__ = ["CollocationBlocks"]
@@ -30,10 +33,10 @@ def _differentiation(degree: int) -> np.ndarray:
 class _PhaseBlocks:
     """The blocks of one phase: rows at a point, within an interval, at the last instant."""
 
-    residual: Block
-    path: Block
-    end: Block
-    interval: Block
+    residual: Block | KeptBlock
+    path: Block | KeptBlock
+    end: Block | KeptBlock
+    interval: Block | KeptBlock
 
 
 class CollocationBlocks:
@@ -42,34 +45,44 @@ class CollocationBlocks:
     Args:
         problem: The structure of the problem.
         degree: Number of Radau points in an interval.
+        kept: Rows and tapes by name of all blocks that matter, if they are known.
     """
 
-    def __init__(self, problem: MultiPhaseProblem, degree: int) -> None:
+    def __init__(
+        self,
+        problem: MultiPhaseProblem,
+        degree: int,
+        kept: Mapping[str, tuple[int, dict[str, Tape]]] | None = None,
+    ) -> None:
         self.problem = problem
         self.degree = degree
-        self.phases = tuple(
-            _PhaseBlocks(
-                residual=self._point_block(phase, phase.residual, "residual"),
-                path=self._point_block(phase, phase.path, "path"),
-                end=self._point_block(phase, phase.end, "end"),
-                interval=self._interval_block(phase),
-            )
-            for phase in problem.phases
-        )
-        self.node = self._node_block()
-        self.boundary = boundary_block(problem, problem.controls)
-        self.sample = self._sample_block()
+        self._kept = kept
+        self.blocks: list[Block | KeptBlock] = []
+        self.phases = tuple(self._phase_blocks(phase) for phase in problem.phases)
+        self.node = self._block("node", self._node_block)
+        boundary = partial(boundary_block, problem, problem.controls)
+        self.boundary = self._block("boundary", boundary)
+        self.sample = self._block("sample", self._sample_block)
 
-    @property
-    def blocks(self) -> tuple[Block, ...]:
-        """All blocks that matter, in a fixed order."""
-        phases = [(p.residual, p.path, p.end, p.interval) for p in self.phases]
-        every = [block for blocks in phases for block in blocks]
-        return tuple(b for b in (*every, self.node, self.boundary, self.sample) if b.matters)
+    def _block(self, name: str, build: Callable[[], Block]) -> Block | KeptBlock:
+        """Return a block of this name, and note it."""
+        if self._kept is None:
+            self.blocks.append(build())
+        else:
+            self.blocks.append(KeptBlock(name, *self._kept.get(name, (0, {})), build))
+        return self.blocks[-1]
 
-    def _point_block(self, phase: Phase, rows: Rows, label: str) -> Block:
+    def _phase_blocks(self, phase: Phase) -> _PhaseBlocks:
+        points = {
+            kind: self._block(f"{phase.name}_{kind}", partial(self._point_block, phase, kind))
+            for kind in ("residual", "path", "end")
+        }
+        interval = self._block(f"{phase.name}_interval", partial(self._interval_block, phase))
+        return _PhaseBlocks(**points, interval=interval)
+
+    def _point_block(self, phase: Phase, kind: str) -> Block:
         """Return rows at one collocation point; unknowns T, p, x, z, y0, u0, u1."""
-        problem = self.problem
+        problem, rows = self.problem, getattr(phase, kind)
         duration, fraction, at = ca.SX.sym("T"), ca.SX.sym("fraction"), ca.SX.sym("at")
         p, x, z = self._unknowns(phase, "")
         y0, u0, u1 = (
@@ -83,7 +96,7 @@ class CollocationBlocks:
         (result,), frozen = self._substituted(phase, [rows.value / rows.scale], values, "")
         unknowns = [duration, *(k.scaled for k in (p, x, z, y0, u0, u1))]
         data = ca.vertcat(fraction, at, problem.point_data)
-        name = f"{phase.name}_{label}"
+        name = f"{phase.name}_{kind}"
         return Block(name, ca.vertcat(*unknowns), data, problem.shared, result, frozen=frozen)
 
     def _unknowns(self, phase: Phase, tag: str) -> tuple[Unknown, Unknown, Unknown]:

@@ -11,7 +11,8 @@ from typing import Final
 
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.gait import GaitProblem
-from pathwalker_cli.ocp.tape_store import keep_tapes, kept_tapes
+from pathwalker_cli.ocp.kernels import kernels
+from pathwalker_cli.ocp.tape_store import cache_folder, keep_tapes, kept_tapes
 
 __all__ = ["gait_blocks"]
 
@@ -27,20 +28,18 @@ def gait_blocks(gait: GaitProblem, degree: int) -> CollocationBlocks:
     """
     key = (gait.structure, degree)
     if key not in _BUILT:
-        blocks = CollocationBlocks(gait.build(), degree)
-        _give_tapes(blocks, key)
-        _BUILT[key] = blocks
+        kept = None if kernels() is None else kept_tapes(key)
+        _BUILT[key] = CollocationBlocks(gait.build(), degree, kept)
+        if kept is None:
+            _keep(_BUILT[key], key)
     return _BUILT[key]
 
 
-def _give_tapes(blocks: CollocationBlocks, key: Hashable) -> None:
-    """Give blocks the tapes that another process made of equal ones, or keep theirs for others."""
-    kept = kept_tapes(key)
-    if kept is not None:
-        for block, tapes in zip(blocks.blocks, kept, strict=True):
-            block.adopt(tapes)
+def _keep(blocks: CollocationBlocks, key: Hashable) -> None:
+    """Keep the tapes of blocks for other processes, if there are tapes and a place for them."""
+    if kernels() is None or cache_folder() is None:
         return
-    made = [block.tapes for block in blocks.blocks]
-    known = [tapes for tapes in made if tapes is not None]
-    if len(known) == len(made):
+    tapes = {b.name: (b.rows, b.tapes) for b in blocks.blocks if b.matters}
+    known = {name: (rows, found) for name, (rows, found) in tapes.items() if found is not None}
+    if len(known) == len(tapes):
         keep_tapes(key, known)
