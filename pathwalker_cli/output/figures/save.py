@@ -114,4 +114,4 @@ def save_figure(figure: Figure, path: str | Path) -> None:
     extension = path.suffix.removeprefix(".")
     with mpl.rc_context(STYLE), atomic_path(path) as temporary:
         figure.savefig(temporary, format=extension, dpi=DPI, metadata=_METADATA[extension])
-    figure.set_layout_engine("none")
+    figure.set_layout_engine(None)  # "none" would have every further format drawn twice
