@@ -10,7 +10,7 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult, NlpSolver
+from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult, NlpSolver, warm_pushes
 from pathwalker_cli.ocp.kkt import KktSystem
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries, gait_series
@@ -24,8 +24,35 @@ __all__ = ["Optimum", "Resolver"]
 _WATCHDOG: Final = {"watchdog_shortened_iter_trigger": 1, "watchdog_trial_iter_max": 30}
 """A neighbour further off is reached by full steps that the filter alone would cut to nothing."""
 
-_NEAR_ITERATIONS: Final = 150
+_WARM_ITERATIONS: Final = 150
 """Iterations after which a warm start is given up; most take about ten, far ones about fifty."""
+
+
+@dataclass(frozen=True)
+class _WarmStart:
+    """How to begin with the multipliers of a neighbour.
+
+    Args:
+        barrier: First barrier parameter; None for a tenth of the tolerance.
+        push: How far the start is moved off its bounds [solver units]; None for IPOPT's settings.
+    """
+
+    barrier: float | None = None
+    push: float | None = None
+
+
+# The further a neighbour, the more bounds become active or inactive on the way to it, and from
+# close to the bounds steps are cut to a few per cent for dozens of iterations.
+_NEAR: Final = _WarmStart()
+_FURTHER: Final = _WarmStart(1e-6, 3e-4)
+_FAR: Final = _WarmStart(1e-5, 1e-2)
+_NEAR_ROWS: Final = 2e-3
+"""Largest root mean square violation of rows [solver units] by the start of a near neighbour."""
+_FURTHER_ROWS: Final = 1e-2
+"""The same for one further off: strengths that vary by 10 % reach 7e-3; masses and lengths, which
+need another start, begin at 1.5e-2."""
+_NEAR_BOUNDS: Final = 0.2
+"""Largest violation of a bound [solver units] by the start of a near one; 5 % of a spring: 0.1."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +138,7 @@ class Resolver:
         steps = motion.phases[: len(self._solver.gait.phases)]
         self._motion = replace(motion, phases=steps)
         self._program = self._program_of(self._solver)
+        self._warm_solvers: dict[_WarmStart, NlpSolver] = {}
         self._multipliers = multipliers
         if multipliers is not None and multipliers.rows.size != self._program.program.rows:
             self._multipliers = None
@@ -125,9 +153,9 @@ class Resolver:
         """The optimum itself, solved to the tolerance."""
         start = self._program.to_unknowns(self._motion)
         result = (
-            self._near.solve(self._program, start, self._multipliers)
+            self._warm(_NEAR).solve(self._program, start, self._multipliers)
             if self._multipliers is not None
-            else self._far.solve(self._program, start)
+            else self._cold.solve(self._program, start)
         )
         return Optimum(self._solver, self._program, result)
 
@@ -148,9 +176,10 @@ class Resolver:
         start = start or self.optimum
         solver = GaitSolver(config)
         program = self._program_of(solver)
-        result = self._near.solve(program, start.result.unknowns, start.result.multipliers)
+        unknowns, multipliers = start.result.unknowns, start.result.multipliers
+        result = self._warm(_suited(program, unknowns)).solve(program, unknowns, multipliers)
         if insist and not result.converged and result.status != "stopped by the user":
-            result = self._far.solve(program, start.result.unknowns)
+            result = self._cold.solve(program, unknowns)
         return Optimum(solver, program, result)
 
     def restored(self, config: StudyConfig, result: NlpResult) -> Optimum:
@@ -161,17 +190,37 @@ class Resolver:
     def _program_of(self, solver: GaitSolver) -> CollocationProgram:
         return CollocationProgram(solver.blocks, solver.prediction, self._motion.meshes)
 
-    @cached_property
-    def _near(self) -> NlpSolver:
-        """From multipliers: the barrier is where the optimum's solve left it."""
-        barrier = min(self._solver.config.solver.refined_barrier, 0.1 * self._tolerance)
-        settings = self._solver.settings(self._tolerance, barrier, warm=True)
-        extra = {**_WATCHDOG, **settings.extra}
-        near = replace(settings, max_iterations=_NEAR_ITERATIONS, extra=extra)
-        return NlpSolver(self._program, near)
+    def _warm(self, start: _WarmStart) -> NlpSolver:
+        """Return the solver that begins with multipliers in this way."""
+        if start not in self._warm_solvers:
+            solver = self._solver.config.solver
+            lowest = min(solver.refined_barrier, 0.1 * self._tolerance)
+            settings = self._solver.settings(self._tolerance, start.barrier or lowest, warm=True)
+            pushes = {} if start.push is None else warm_pushes(start.push)
+            extra = {**_WATCHDOG, **pushes, **settings.extra}
+            settings = replace(settings, max_iterations=_WARM_ITERATIONS, extra=extra)
+            self._warm_solvers[start] = NlpSolver(self._program, settings)
+        return self._warm_solvers[start]
 
     @cached_property
-    def _far(self) -> NlpSolver:
+    def _cold(self) -> NlpSolver:
         """Where the neighbour is too far for the multipliers to help."""
         barrier = self._solver.config.solver.warm_barrier
         return NlpSolver(self._program, self._solver.settings(self._tolerance, barrier))
+
+
+def _suited(program: CollocationProgram, start: np.ndarray) -> _WarmStart:
+    """Return how to begin with this start: by how much it misses rows and bounds."""
+    nlp = program.program
+    (_, rows) = nlp.functions()["nlp"](start, program.parameters)
+    missed = _outside(np.asarray(rows).ravel(), nlp.lower, nlp.upper)
+    rms = float(np.sqrt(np.mean(missed**2)))
+    beyond = float(_outside(start, *program.bounds).max())
+    if rms > _FURTHER_ROWS:
+        return _FAR
+    return _NEAR if rms < _NEAR_ROWS and beyond < _NEAR_BOUNDS else _FURTHER
+
+
+def _outside(values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Return by how much values are outside their bounds."""
+    return np.asarray(np.maximum(np.maximum(lower - values, values - upper), 0.0))

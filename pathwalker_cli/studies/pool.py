@@ -7,24 +7,19 @@ import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.ocp.ipopt import warm_pushes
 from pathwalker_cli.output.run_folder import load_run
 from pathwalker_cli.studies.base import resolver_of
 from pathwalker_cli.studies.journal import STOPPED, Journal
 from pathwalker_cli.studies.measures import measures
 from pathwalker_cli.studies.processes import end_with_parent
 
-__all__ = ["Job", "Solved", "for_far_neighbours", "solve_jobs"]
-
-_FAR: Final = {**warm_pushes(1e-2), "mu_init": 1e-5}
-"""Options of IPOPT for neighbours that differ in many numbers at once: these change which bounds
-are active, and from nearer the bounds steps are cut to a few per cent for dozens of iterations."""
+__all__ = ["Job", "Solved", "solve_jobs"]
 
 
 @dataclass(frozen=True)
@@ -59,11 +54,6 @@ class Solved:
     iterations: int
     seconds: float
     kept: bool
-
-
-def for_far_neighbours(config: StudyConfig) -> StudyConfig:
-    """Return a config whose solver is ready to go far; its own IPOPT options win."""
-    return with_values(config, {"solver.ipopt": {**_FAR, **config.solver.ipopt}})
 
 
 def solve_jobs(
@@ -102,7 +92,6 @@ _Origin = tuple[Path, Path, float]
 
 def _journal(origin: _Origin) -> Journal:
     run = load_run(origin[0])
-    run = replace(run, config=for_far_neighbours(run.config))
     return Journal(origin[1], run, resolver_of(run, origin[2]))
 
 

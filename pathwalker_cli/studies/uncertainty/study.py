@@ -16,7 +16,7 @@ from pathwalker_cli.output.run_folder import Run
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.studies.base import NeighbourStudy, require_optimum, resolver_of
 from pathwalker_cli.studies.measures import measures
-from pathwalker_cli.studies.pool import Job, Solved, for_far_neighbours, solve_jobs
+from pathwalker_cli.studies.pool import Job, Solved, solve_jobs
 from pathwalker_cli.studies.springs import spring_ranges
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, draw, inputs_of
 from pathwalker_cli.studies.uncertainty.result import Uncertainty
@@ -56,8 +56,7 @@ def uncertainty(
         NotConvergedError: If the optimum cannot be solved to the tolerance.
     """
     began = time.perf_counter()
-    config = for_far_neighbours(run.config)
-    config = with_values(config, {"solver.tolerance": study.tolerance})
+    config = with_values(run.config, {"solver.tolerance": study.tolerance})
     draws = draw(inputs_of(study.quantities, load_patient(config.patient)), study.draws, study.seed)
     jobs = [Job(f"draw-{i:05d}", c) for i, c in enumerate(draw_configs(config, draws))]
     base = require_optimum(resolver_of(run, study.tolerance), run, study.tolerance)
