@@ -13,7 +13,7 @@ from pathwalker_cli.ocp.ipopt import IpoptSettings, solve_program
 from pathwalker_cli.ocp.kkt import KktSystem
 from pathwalker_cli.ocp.neighbourhood import Neighbourhood
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers
-from pathwalker_cli.ocp.resolve import Resolver
+from pathwalker_cli.ocp.resolve import Resolver, warm_start_for
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.ocp.symmetric import SymmetricSystem
 from pathwalker_cli.studies.measures import measures
@@ -96,6 +96,20 @@ def test_derivatives_hold_where_inequalities_are_active() -> None:
     found = system.answer(book.program(1.0 - STEP), book.program(1.0 + STEP), STEP)
     assert found.cost == pytest.approx(2.0 * book.result.objective, rel=1e-5)
     assert system.changed(system) == 0
+
+
+def test_a_warm_start_goes_further_off_its_bounds_the_more_it_misses() -> None:
+    book = Textbook()
+    barriers = [
+        warm_start_for(program, book.result.unknowns).barrier
+        for program in (
+            book.program(1.001),
+            book.program(1.005),
+            book.program(duration=0.8),
+            book.program(2.0),
+        )
+    ]
+    assert barriers == [None, 1e-6, 1e-6, 1e-5]
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.ocp.symmetry import full_stride
 from pathwalker_cli.ocp.verify import Reintegration, reintegrate
 
-__all__ = ["Optimum", "Resolver"]
+__all__ = ["Optimum", "Resolver", "WarmStart", "warm_start_for"]
 
 _WATCHDOG: Final = {"watchdog_shortened_iter_trigger": 1, "watchdog_trial_iter_max": 30}
 """A neighbour further off is reached by full steps that the filter alone would cut to nothing."""
@@ -29,7 +29,7 @@ _WARM_ITERATIONS: Final = 150
 
 
 @dataclass(frozen=True)
-class _WarmStart:
+class WarmStart:
     """How to begin with the multipliers of a neighbour.
 
     Args:
@@ -43,9 +43,9 @@ class _WarmStart:
 
 # The further a neighbour, the more bounds become active or inactive on the way to it, and from
 # close to the bounds steps are cut to a few per cent for dozens of iterations.
-_NEAR: Final = _WarmStart()
-_FURTHER: Final = _WarmStart(1e-6, 3e-4)
-_FAR: Final = _WarmStart(1e-5, 1e-2)
+_NEAR: Final = WarmStart()
+_FURTHER: Final = WarmStart(1e-6, 3e-4)
+_FAR: Final = WarmStart(1e-5, 1e-2)
 _NEAR_ROWS: Final = 2e-3
 """Largest root mean square violation of rows [solver units] by the start of a near neighbour."""
 _FURTHER_ROWS: Final = 1e-2
@@ -138,7 +138,7 @@ class Resolver:
         steps = motion.phases[: len(self._solver.gait.phases)]
         self._motion = replace(motion, phases=steps)
         self._program = self._program_of(self._solver)
-        self._warm_solvers: dict[_WarmStart, NlpSolver] = {}
+        self._warm_solvers: dict[WarmStart, NlpSolver] = {}
         self._multipliers = multipliers
         if multipliers is not None and multipliers.rows.size != self._program.program.rows:
             self._multipliers = None
@@ -177,7 +177,7 @@ class Resolver:
         solver = GaitSolver(config)
         program = self._program_of(solver)
         unknowns, multipliers = start.result.unknowns, start.result.multipliers
-        result = self._warm(_suited(program, unknowns)).solve(program, unknowns, multipliers)
+        result = self._warm(warm_start_for(program, unknowns)).solve(program, unknowns, multipliers)
         if insist and not result.converged and result.status != "stopped by the user":
             result = self._cold.solve(program, unknowns)
         return Optimum(solver, program, result)
@@ -190,7 +190,7 @@ class Resolver:
     def _program_of(self, solver: GaitSolver) -> CollocationProgram:
         return CollocationProgram(solver.blocks, solver.prediction, self._motion.meshes)
 
-    def _warm(self, start: _WarmStart) -> NlpSolver:
+    def _warm(self, start: WarmStart) -> NlpSolver:
         """Return the solver that begins with multipliers in this way."""
         if start not in self._warm_solvers:
             solver = self._solver.config.solver
@@ -209,7 +209,7 @@ class Resolver:
         return NlpSolver(self._program, self._solver.settings(self._tolerance, barrier))
 
 
-def _suited(program: CollocationProgram, start: np.ndarray) -> _WarmStart:
+def warm_start_for(program: CollocationProgram, start: np.ndarray) -> WarmStart:
     """Return how to begin with this start: by how much it misses rows and bounds."""
     nlp = program.program
     (_, rows) = nlp.functions()["nlp"](start, program.parameters)
