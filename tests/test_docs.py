@@ -20,6 +20,7 @@ from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.yaml_file import read_mapping, validate
+from pathwalker_cli.goals import GOALS
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.output.figures import FIGURES
 from pathwalker_cli.output.run_folder import ENTRIES
@@ -193,8 +194,14 @@ def resolves(name: str) -> bool:
 # Single pages
 
 
+def test_theory_has_the_equation_of_every_goal() -> None:
+    section = text_of("docs/theory.md").split("### 2.4 ")[1].split("### 2.5 ")[0]
+    assert re.findall(r"^\| `(\w+)` \|.*\$", section, re.MULTILINE) == list(GOALS)
+
+
 def test_theory_states_the_phases_as_they_are() -> None:
-    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", text_of("docs/theory.md"), re.MULTILINE)
+    section = text_of("docs/theory.md").split("### 2.1 ")[1].split("### 2.2 ")[0]
+    rows = re.findall(r"^\| `(\w+)` \|(.*)\|$", section, re.MULTILINE)
     assert [name for name, _ in rows] == [phase.name for phase in PHASES]
     following = PHASES[1:] + PHASES[:1]
     for (_, cells), phase, after in zip(rows, PHASES, following, strict=True):

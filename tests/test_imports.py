@@ -22,7 +22,7 @@ LAYERS = (
     {"patient"},
     {"io.recordings"},
     {"model"},
-    {"problems", "variation"},
+    {"problems", "variation", "goals"},
     {"config"},
     {"ocp", "inverse"},
     {"output"},

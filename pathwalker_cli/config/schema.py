@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from pathwalker_cli.config.nested import merged
 from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, Condition
+from pathwalker_cli.goals import COMFORT_COORDINATES, GOALS, Goals
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.patient_blocks import Stiffness
@@ -75,6 +76,36 @@ class CostConfig(YamlModel):
     walking_speed_weight: Weight = 0.0
     fit_weight: Weight = 1.0
     excitation_weight: Weight = 1e-4
+    activation_power: Annotated[int, Field(ge=2, le=10)] = 2
+    goals: dict[str, Weight] = Field(default_factory=dict)
+    comfort_ranges: dict[str, Range] = Field(default_factory=dict)
+
+    @field_validator("goals")
+    @classmethod
+    def _goals(cls, value: dict[str, float]) -> dict[str, float]:
+        _named(value, GOALS)
+        return value
+
+    @field_validator("comfort_ranges")
+    @classmethod
+    def _comfort(cls, value: dict[str, Range]) -> dict[str, Range]:
+        _named_ranges(value, COMFORT_COORDINATES)
+        return value
+
+    @model_validator(mode="after")
+    def _ranges_of_goals(self) -> CostConfig:
+        if self.goals.get("discomfort") and not self.comfort_ranges:
+            raise invalid(
+                "weighs the goal 'discomfort' but says of no joint what is comfortable",
+                mend="add comfort_ranges, e.g. {knee_r: [0.0, 0.9]}",
+            )
+        return self
+
+    @property
+    def wanted(self) -> Goals:
+        """The goals that have a weight, and what they need."""
+        names = tuple(name for name in GOALS if self.goals.get(name, 0.0) > 0.0)
+        return Goals(names, self.activation_power, self.comfort_ranges)
 
 
 class BoundsConfig(YamlModel):
@@ -239,6 +270,22 @@ class StudyConfig(YamlModel):
                 f"asks {self.problem} for a "
                 + ("half cycle" if self.half_cycle else "synthetic start"),
                 allowed="a whole recorded passage: start.gait recorded, half_cycle false",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _goals_that_suit(self) -> StudyConfig:
+        names = self.cost.wanted.names
+        if self.fits and names:
+            raise invalid(
+                f"asks for the goal '{names[0]}', but {self.problem} follows a recording",
+                mend="leave cost.goals out",
+            )
+        whole = [name for name in names if GOALS[name].whole_stride]
+        if self.half_cycle and whole:
+            raise invalid(
+                f"asks half a cycle for the goal '{whole[0]}': it is symmetric already",
+                mend="leave the goal out, or set half_cycle to false",
             )
         return self
 

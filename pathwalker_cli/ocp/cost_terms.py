@@ -1,4 +1,4 @@
-"""The terms of the objective, equations (8), (9) and (10), evaluated on a motion."""
+"""The terms of the objective, evaluated on a motion: equations (8), (9), (10) and goals."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES
-from pathwalker_cli.ocp.gait import INTEGRALS, GaitWeights
+from pathwalker_cli.goals import Goals
+from pathwalker_cli.ocp.gait import EXCITATION, GaitProblem, GaitWeights
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import Sample
 
@@ -15,40 +16,45 @@ __all__ = ["cost_terms", "prediction_terms", "walked_distance"]
 
 
 def cost_terms(
-    motion: PhasedMotion, weights: GaitWeights, samples: tuple[Sample, ...] = ()
+    motion: PhasedMotion, gait: GaitProblem, weights: GaitWeights, samples: tuple[Sample, ...] = ()
 ) -> dict[str, float]:
     """Return the terms of the objective by name; they add up to the cost.
 
     Args:
         motion: A whole stride.
+        gait: The problem that it solves.
         weights: Weights of the terms.
         samples: Recorded instants of a passage; without them the stride is a prediction.
     """
-    totals = motion.phases[-1].integrals[-1]
-    terms = prediction_terms(motion, dict(zip(INTEGRALS, totals, strict=False)), weights)
+    totals = dict(zip(gait.integrals, motion.phases[-1].integrals[-1], strict=True))
+    terms = prediction_terms(motion, totals, gait.goals, weights)
     if samples:
         terms["fit"] = weights.fit * squared_distance(motion, samples)
-        terms["excitation_regularisation"] = weights.excitation * float(totals[len(INTEGRALS)])
+        terms["excitation_regularisation"] = weights.excitation * float(totals[EXCITATION])
     return terms
 
 
 def prediction_terms(
-    motion: PhasedMotion, costs: Mapping[str, float], weights: GaitWeights
+    motion: PhasedMotion, costs: Mapping[str, float], goals: Goals, weights: GaitWeights
 ) -> dict[str, float]:
-    """Return the terms of equations (9) and (10) by name.
+    """Return the terms of equations (9) and (10) and those of clinical goals by name.
 
     Args:
         motion: A whole stride.
         costs: Integrals of the running costs over it by name, without weights.
+        goals: The goals that count.
         weights: Weights of the terms.
     """
-    distance = walked_distance(motion)
+    distance, time = walked_distance(motion), motion.duration
     terms = {
         "effort_per_distance": weights.effort * costs["effort"] / distance,
         "rate_regularisation": weights.rate * costs["rate"] / distance,
         "acceleration_regularisation": weights.acceleration * costs["acceleration"] / distance,
-        "walking_speed": -weights.walking_speed * distance / motion.duration,
+        "walking_speed": -weights.walking_speed * distance / time,
     }
+    durations = [phase.duration for phase in motion.phases]
+    for name, value in goals.values(costs, distance, time, durations).items():
+        terms[name] = weights.goals[name] * value
     return {name: float(value) for name, value in terms.items()}
 
 

@@ -8,8 +8,8 @@ controls their rates.  For fixed a, equation (2) increases strictly in the excit
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Final, Literal
 
@@ -24,6 +24,7 @@ from pathwalker_cli.conventions import (
     SIDES,
     STIFFNESSES,
 )
+from pathwalker_cli.goals import Goals
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 from pathwalker_cli.model.curves import BezierChain, evaluate
 from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME, excitation_from_rate
@@ -41,8 +42,8 @@ from pathwalker_cli.ocp.problem import (
 )
 
 __all__ = [
+    "EXCITATION",
     "INTEGRALS",
-    "PASSAGE_INTEGRALS",
     "STIFFNESSES",
     "WEIGHTS",
     "Form",
@@ -56,10 +57,10 @@ RESERVES: Final = tuple(f"{name}_reserve" for name in COORDINATES)
 ACTIVATIONS: Final = tuple(f"{name}_activation" for name in GENERATORS)
 RATES: Final = tuple(f"{name}_rate" for name in GENERATORS)
 INTEGRALS: Final = ("effort", "rate", "acceleration", "tracking", "reserve")
-"""Running costs: the sums of a^2, (rate / 20)^2, (vdot / 50)^2, (q - q_ref)^2 and
-(reserve / 20)^2."""
-PASSAGE_INTEGRALS: Final = (*INTEGRALS, "excitation")
-"""Running costs of a passage: also the sum of the squared excitations."""
+"""Running costs of every gait: the sums of a^2 (or a higher power), (rate / 20)^2, (vdot / 50)^2,
+(q - q_ref)^2 and (reserve / 20)^2."""
+EXCITATION: Final = "excitation"
+"""A further running cost of a passage: the sum of the squared excitations."""
 
 Form = Literal["stride", "step", "passage"]
 """A periodic stride of eight phases, one step of a symmetric gait, or a stride from a recording
@@ -84,6 +85,7 @@ class GaitWeights:
         smoothing: Weight of the integrals of squared activations and rates, not per distance.
         fit: Weight of the sum over recorded instants of (q - q_recorded)^2, equation (8).
         excitation: delta of equation (8), weight of the integral of the squared excitations.
+        goals: Weights of clinical goals by name.
     """
 
     effort: float = 1.0
@@ -95,10 +97,12 @@ class GaitWeights:
     smoothing: float = 0.0
     fit: float = 0.0
     excitation: float = 0.0
+    goals: Mapping[str, float] = field(default_factory=dict)
 
-    def vector(self) -> np.ndarray:
-        """Return the weights in the order of `WEIGHTS`."""
-        return np.array([getattr(self, name) for name in WEIGHTS])
+    def vector(self, goals: Sequence[str] = ()) -> np.ndarray:
+        """Return the weights in the order of `WEIGHTS`, then those of these goals."""
+        own = [getattr(self, name) for name in WEIGHTS]
+        return np.array([*own, *(self.goals.get(name, 0.0) for name in goals)])
 
 
 WEIGHTS: Final = (
@@ -117,18 +121,26 @@ WEIGHTS: Final = (
 class _Constants:
     """Symbols of the numbers that a patient and a config bring in, and their values."""
 
-    def __init__(self, walker: Walker) -> None:
+    def __init__(self, walker: Walker, goals: Goals) -> None:
         body = walker.rigid_body
         self.theta = ca.SX.sym("theta", len(body.parameter_names))
         self.strength = ca.SX.sym("strength", len(GENERATORS))
         self.friction = ca.SX.sym("friction")
-        self.weights = ca.SX.sym("weights", len(WEIGHTS))
+        self.weights = ca.SX.sym("weights", len(WEIGHTS) + len(goals.names))
+        self.goal_numbers = ca.SX.sym("goal_numbers", goals.size)
         self._sides = [] if walker.orthosis is None else [ca.SX.sym(s, 7) for s in SIDES]
 
     @property
     def vector(self) -> ca.SX:
         """All constants, one after the other."""
-        return ca.vertcat(self.theta, self.strength, self.friction, self.weights, *self._sides)
+        return ca.vertcat(
+            self.theta,
+            self.strength,
+            self.friction,
+            self.weights,
+            *self._sides,
+            self.goal_numbers,
+        )
 
     @property
     def sides(self) -> tuple[OrthosisSide, ...]:
@@ -137,7 +149,11 @@ class _Constants:
 
     @staticmethod
     def values(
-        walker: Walker, weights: GaitWeights, friction: float, orthosis_share: float
+        walker: Walker,
+        goals: Goals,
+        weights: GaitWeights,
+        friction: float,
+        orthosis_share: float,
     ) -> np.ndarray:
         """Return the values in the order of `vector`."""
         sides = [side.scaled(orthosis_share) for side in walker.orthosis or ()]
@@ -146,8 +162,9 @@ class _Constants:
                 walker.rigid_body.parameters,
                 walker.max_isometric_torque,
                 [friction],
-                weights.vector(),
+                weights.vector(goals.names),
                 *(list(vars(side).values()) for side in sides),
+                goals.numbers(walker.weight),
             ]
         )
 
@@ -175,14 +192,17 @@ class GaitProblem:
     Args:
         walker: The walker; its condition decides whether there are stiffnesses to find.
         form: What the phases are.
+        goals: Clinical goals, and the power of the effort.
     """
 
-    def __init__(self, walker: Walker, form: Form = "stride") -> None:
+    def __init__(self, walker: Walker, form: Form = "stride", goals: Goals | None = None) -> None:
         self.walker = walker
         self.form = form
+        self.goals = goals or Goals()
         self.phases = PHASES[: len(PHASES) // 2] if form == "step" else PHASES
-        self.integrals = PASSAGE_INTEGRALS if form == "passage" else INTEGRALS
-        self.constants = _Constants(walker)
+        last = (EXCITATION,) if form == "passage" else ()
+        self.integrals = (*INTEGRALS, *self.goals.integrals, *last)
+        self.constants = _Constants(walker, self.goals)
         scale = np.concatenate([np.ones(len(COORDINATES)), np.full(len(COORDINATES), _VELOCITY)])
         self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
         self.activations = Variables.make("a", ACTIVATIONS, 1.0)
@@ -195,8 +215,8 @@ class GaitProblem:
     def structure(self) -> Hashable:
         """What the expressions depend on; problems of equal structure differ in numbers only."""
         body = self.walker.rigid_body
-        names = tuple(body.parameter_names)
-        return self.form, body.backend, body.topology, names, self.walker.orthosis is not None
+        names, worn = tuple(body.parameter_names), self.walker.orthosis is not None
+        return self.form, body.backend, body.topology, names, worn, self.goals.structure
 
     @property
     def q(self) -> ca.SX:
@@ -236,7 +256,7 @@ class GaitProblem:
             friction: Coefficient of friction.
             orthosis_share: Share of the orthosis' fixed torques, below 1 to ease in a start.
         """
-        return self.constants.values(self.walker, weights, friction, orthosis_share)
+        return self.constants.values(self.walker, self.goals, weights, friction, orthosis_share)
 
     @cached_property
     def _torques(self) -> tuple[ca.SX, FrozenTerms]:
@@ -283,7 +303,7 @@ class GaitProblem:
             path=self._path(contact, force, motion["position"]),
             end=self._touch_down(contact.touched_down(following), motion),
             fixed_at_end=self._fixed_at_end(contact, following),
-            integrands=self._integrands(vdot, reserve),
+            integrands=self._integrands(contact, vdot, force, reserve),
             frozen=frozen,
         )
 
@@ -296,16 +316,21 @@ class GaitProblem:
             "acceleration": body.point_accelerations(self.q, self.v, vdot, theta),
         }
 
-    def _integrands(self, vdot: ca.SX, reserve: ca.SX) -> ca.SX:
+    def _integrands(
+        self, contact: ContactPhase, vdot: ca.SX, force: ca.SX, reserve: ca.SX
+    ) -> ca.SX:
+        a, numbers = self.activations.symbol, ca.vertsplit(self.constants.goal_numbers)
+        q, v, activation, load = (ca.vertsplit(x) for x in (self.q, self.v, a, force))
         terms = [
-            ca.sumsqr(self.activations.symbol),
+            ca.sum1(a**self.goals.activation_power),
             ca.sumsqr(self.rates.symbol / _RATE),
             ca.sumsqr(vdot / _ACCELERATION),
             ca.sumsqr(self.q - self.reference),
             ca.sumsqr(reserve / _TORQUE),
+            *self.goals.integrands(contact, q, v, activation, load, numbers),
         ]
-        if "excitation" in self.integrals:
-            excitation = excitation_from_rate(self.rates.symbol, self.activations.symbol)
+        if EXCITATION in self.integrals:
+            excitation = excitation_from_rate(self.rates.symbol, a)
             terms.append(ca.sumsqr(excitation))
         return ca.vertcat(*terms)
 
@@ -389,12 +414,14 @@ class GaitProblem:
         )
 
     def _boundary(self) -> Boundary:
-        weights = dict(zip(WEIGHTS, ca.vertsplit(self.constants.weights), strict=True))
+        names = (*WEIGHTS, *self.goals.names)
+        weights = dict(zip(names, ca.vertsplit(self.constants.weights), strict=True))
         return gait_boundary(
             (self.states, self.activations, self.rates),
             self.stiffness,
             self.integrals,
             weights,
+            self.goals,
             len(self.phases),
             self.form == "step",
             self._standing() if self.form == "passage" else None,

@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from pathwalker_cli.conventions import mirror_permutation
+from pathwalker_cli.goals import Goals
 from pathwalker_cli.ocp.problem import INFINITY, Boundary, Instant, Rows, Variables
 
 __all__ = ["PER_DISTANCE", "gait_boundary"]
@@ -25,6 +26,7 @@ def gait_boundary(
     parameters: Variables,
     integrals: Sequence[str],
     weights: Mapping[str, ca.SX],
+    goals: Goals,
     phases: int,
     mirrored: bool,
     start: Rows | None = None,
@@ -36,6 +38,7 @@ def gait_boundary(
         parameters: Free parameters; of a mirrored gait left and right are equal.
         integrals: Names of the running costs.
         weights: Weight of every cost term by name.
+        goals: Clinical goals.
         phases: Number of phases.
         mirrored: Whether the phases are one step and the other is its mirror image.
         start: Rows in the first instant's states (the symbol of `groups[0]`) of a passage that
@@ -65,6 +68,8 @@ def gait_boundary(
     objective += weights["reserve"] * total["reserve"]
     objective += weights["smoothing"] * (total["effort"] + total["rate"])
     objective -= weights["walking_speed"] * distance / time
+    for name, value in goals.values(total, distance, time, ca.vertsplit(durations)).items():
+        objective += weights[name] * value
     if "excitation" in total:
         objective += weights["excitation"] * total["excitation"]
     return Boundary(first, last, durations, totals, rows, objective)

@@ -17,6 +17,7 @@ from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.cost_terms import cost_terms
 from pathwalker_cli.ocp.gait import Form, GaitProblem, GaitWeights
 from pathwalker_cli.ocp.gait_bounds import gait_bounds, recorded_durations, tracking_bounds
+from pathwalker_cli.ocp.goal_costs import with_goal_costs
 from pathwalker_cli.ocp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.passage import passage_samples, recorded_passage
@@ -76,7 +77,7 @@ class GaitSolver:
         model = self.config.model
         self.walker = build_walker(patient, self.config.condition, model.published, model.backend)
         self.bounds = gait_bounds(self.walker, self.config.bounds)
-        self.gait = GaitProblem(self.walker, self._form())
+        self.gait = GaitProblem(self.walker, self._form(), self.config.cost.wanted)
         if self.config.start.gait == "recorded":
             _ = self.stride  # a missing recording is refused before anything is built
         if self.config.fits:
@@ -108,6 +109,7 @@ class GaitSolver:
             walking_speed=cost.walking_speed_weight,
             fit=cost.fit_weight,
             excitation=cost.excitation_weight,
+            goals=cost.goals,
         )
 
     @cached_property
@@ -215,6 +217,8 @@ class GaitSolver:
             settings = self.settings(loose or solver.tolerance, solver.first_barrier)
         else:
             warm_start = replace(warm_start, phases=warm_start.phases[: len(self.gait.phases)])
+            if not config.fits:
+                warm_start = with_goal_costs(warm_start, self.gait.goals, self.walker.weight)
             kept = config.mesh.refinements > 0
             motion = warm_start if kept else self._on_first_mesh(warm_start)
             settings = self.settings(loose or solver.tolerance, solver.warm_barrier)
@@ -317,7 +321,7 @@ class GaitSolver:
             nlp=result,
             bounds=self.bounds,
             cost=result.objective,
-            cost_terms=cost_terms(motion, self.weights, self.samples),
+            cost_terms=cost_terms(motion, self.gait, self.weights, self.samples),
             violations=largest_violations(program, result),
             active=active_bounds(program, result),
             reintegration=errors,

@@ -13,6 +13,7 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.ocp.goal_costs import goal_values
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output.metrics import gait_metrics
 from pathwalker_cli.output.versions import versions
@@ -93,6 +94,9 @@ def _outcome(solution: GaitSolution) -> dict[str, Any]:
         "smoke": solution.config.smoke,
         "cost": solution.cost,
         "cost_terms": solution.cost_terms,
+        "goals": goal_values(
+            solution.last_motion, solution.walker.weight, solution.config.cost.comfort_ranges
+        ),
     }
 
 

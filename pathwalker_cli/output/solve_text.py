@@ -71,6 +71,8 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
     stages = (f"{s.name} {s.iterations} in {s.seconds:.1f} s" for s in solution.stages)
     seconds = (f"{part} {metrics[f'seconds_{part}']:.1f}" for part in ("build", "solve", "verify"))
     rows = [
+        ("cost terms", _sum_text(solution.cost_terms)),
+        ("clinical goals", ", ".join(f"{_words(n)} {v:.4g}" for n, v in metrics["goals"].items())),
         ("largest violation", f"{worst.amount:.1e} ({worst.name})"),
         ("re-integration error", again),
         ("second engine", f"equations of motion met within {solution.second_engine:.1e} N or N m"),
@@ -79,6 +81,15 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
         ("dynamics, start", f"{solution.walker.backend}, {solution.start}"),
     ]
     return [*rows, *(("active bound", line) for line in bound_lines(solution))]
+
+
+def _sum_text(terms: Mapping[str, float]) -> str:
+    """Return the terms that count, e.g. "effort per distance 0.2535 + walking speed -1.3"."""
+    return " + ".join(f"{_words(name)} {value:.4g}" for name, value in terms.items() if value)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def optimum_lines(optima: Sequence[LocalOptimum]) -> list[tuple[str, str]]:

@@ -1,0 +1,173 @@
+"""Clinical goals: values and derivatives against formulas written anew; what configs may ask."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from helpers import stylised_series
+from pathwalker_cli.config import load_config, smoke_version, with_values
+from pathwalker_cli.conventions import COORDINATES, GENERATORS
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.goals import COMFORT_COORDINATES, GOALS, Goals
+from pathwalker_cli.model.contact import PHASES, phase_named
+from pathwalker_cli.ocp.goal_costs import goal_values, with_goal_costs
+from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.ocp.solve import solve_study
+
+WEIGHT = 262.0
+RANGES = {"knee_r": (0.3, 0.5), "lumbar": (0.0, 0.1)}
+EVERY = Goals(tuple(GOALS), comfort_ranges=RANGES)
+N = len(COORDINATES)
+
+
+def expected(motion: PhasedMotion) -> dict[str, float]:
+    """Return all values by the formulas of docs/theory.md, by trapezoids on a fine grid."""
+    crouch = pressure = peak = discomfort = first = 0.0
+    differences = np.zeros(3)
+    for i, phase in enumerate(motion.phases):
+        at = np.linspace(0.0, 1.0, 4001)
+        x, a = phase.states_at(at), phase.smooth_at(at)
+        contact = phase_named(phase.name)
+        angle = {name: x[:, k] for k, name in enumerate(COORDINATES)}
+
+        def over(values: Any, at: np.ndarray = at, duration: float = phase.duration) -> float:
+            return duration * float(np.trapezoid(np.broadcast_to(values, at.shape), at))
+
+        crouch += sum(over(angle[f"knee_{s}"] ** 2) for s in {p[-1] for p in contact.points})
+        # forces of the made motion do not change within a phase
+        force = phase.algebraic[0, 0, N : N + len(contact.forces)]
+        load = dict(zip(contact.forces, force, strict=True))
+        for s in "rl":
+            arm = load.get(f"toe_{s}_z", 0.0) - load.get(f"heel_{s}_z", 0.0)
+            pressure += over((arm / WEIGHT) ** 2)
+        peak += over((a**8).sum(axis=1))
+        for name, (lower, upper) in RANGES.items():
+            for beyond in (angle[name] - upper, lower - angle[name]):
+                discomfort += over((0.5 * (beyond + np.hypot(beyond, 0.01))) ** 2)
+        first += over(x[:, N]) if i < 4 else 0.0
+        joints = ("hip", "knee", "ankle")
+        differences += [over(angle[f"{j}_r"] - angle[f"{j}_l"]) for j in joints]
+    time, times = motion.duration, np.array(motion.durations)
+    distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
+    asymmetry = ((2 * first - distance) / distance) ** 2
+    asymmetry += float((((times[:4] - times[4:]) / time) ** 2).sum())
+    asymmetry += float(((differences / time) ** 2).sum())
+    return {
+        "crouch": crouch / time,
+        "asymmetry": asymmetry,
+        "centre_of_pressure": pressure / time,
+        "peak_activation": (peak / time + 1e-6) ** 0.125,
+        "discomfort": discomfort / time,
+    }
+
+
+def test_values_are_those_of_the_formulas() -> None:
+    motion = stylised_series("barefoot").motion
+    found, wanted = goal_values(motion, WEIGHT, RANGES), expected(motion)
+    assert set(found) == set(GOALS)
+    for name, value in wanted.items():
+        # ranges of comfort that cover every other joint still cost their rounded edge
+        assert found[name] == pytest.approx(value, rel=2e-3, abs=1e-4), name
+    assert "discomfort" not in goal_values(motion, WEIGHT, {})
+
+
+def test_running_costs_of_a_start_add_up_to_the_values() -> None:
+    motion = with_goal_costs(stylised_series("barefoot").motion, EVERY, WEIGHT)
+    totals = motion.phases[-1].integrals[-1][-len(EVERY.integrals) :]
+    costs = dict(zip(EVERY.integrals, totals, strict=True))
+    distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
+    values = EVERY.values(costs, distance, motion.duration, list(motion.durations))
+    assert values == pytest.approx(goal_values(motion, WEIGHT, RANGES))
+    for before, after in zip(motion.phases, motion.phases[1:], strict=False):
+        assert np.allclose(before.integrals[-1], after.integrals[0])
+
+
+@pytest.mark.parametrize("name", GOALS)
+@pytest.mark.parametrize("phase", [PHASES[0], PHASES[3], PHASES[6]], ids=lambda phase: phase.name)
+def test_derivatives_of_running_costs_are_those_of_differences(name: str, phase: Any) -> None:
+    goals, rng = Goals((name,), comfort_ranges=RANGES), np.random.default_rng(4)
+    sizes = [N, N, len(GENERATORS), len(phase.forces)]
+    point = np.concatenate([rng.uniform(0.1, 0.9, sum(sizes[:3])), 100 * rng.random(sizes[3])])
+    numbers = list(goals.numbers(WEIGHT))
+
+    def costs(x: np.ndarray) -> np.ndarray:
+        parts = [list(part) for part in np.split(x, np.cumsum(sizes)[:-1])]
+        return np.array(goals.integrands(phase, *parts, numbers), dtype=float)
+
+    x = ca.SX.sym("x", sum(sizes))
+    parts = [ca.vertsplit(part) for part in ca.vertsplit(x, [0, *np.cumsum(sizes).tolist()])]
+    symbols = ca.vertcat(*goals.integrands(phase, *parts, numbers))
+    jacobian = np.asarray(ca.Function("j", [x], [ca.jacobian(symbols, x)])(point))
+    assert np.asarray(ca.Function("c", [x], [symbols])(point)).ravel() == pytest.approx(
+        costs(point)
+    )
+    for k, step in enumerate(1e-6 * np.eye(len(point))):
+        change = (costs(point + step) - costs(point - step)) / 2e-6
+        assert jacobian[:, k] == pytest.approx(change, rel=1e-5, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", GOALS)
+def test_derivatives_of_values_are_those_of_differences(name: str) -> None:
+    goals, rng = Goals((name,)), np.random.default_rng(5)
+    count = len(goals.integrals)
+    point = rng.uniform(0.1, 0.6, count + 10)
+
+    def value(x: Any) -> Any:
+        costs = {integral: x[i] for i, integral in enumerate(goals.integrals)}
+        return goals.values(costs, x[count], x[count + 1], [x[count + 2 + i] for i in range(8)])[
+            name
+        ]
+
+    x = ca.SX.sym("x", len(point))
+    gradient = np.asarray(ca.Function("g", [x], [ca.gradient(value(x), x)])(point)).ravel()
+    for k, step in enumerate(1e-6 * np.eye(len(point))):
+        change = (value(point + step) - value(point - step)) / 2e-6
+        assert gradient[k] == pytest.approx(change, rel=1e-5, abs=1e-8)
+
+
+def test_a_solve_with_every_goal_adds_up_and_trades_effort_for_them() -> None:
+    weights = {"crouch": 5.0, "asymmetry": 1.0, "centre_of_pressure": 1.0, "discomfort": 5.0,
+               "peak_activation": 0.5}  # fmt: skip
+    changes = {"cost.goals": weights, "cost.comfort_ranges": {"lumbar": (-0.1, 0.3)},
+               "cost.activation_power": 3}  # fmt: skip
+    config = with_values(smoke_version(load_config("mapd-barefoot")), changes)
+    solution = solve_study(config)
+    assert solution.converged
+    terms = solution.cost_terms
+    assert sum(terms.values()) == pytest.approx(solution.cost, rel=1e-8)
+    found = goal_values(solution.last_motion, solution.walker.weight, config.cost.comfort_ranges)
+    for name, weight in weights.items():
+        assert terms[name] == pytest.approx(weight * found[name], rel=1e-8), name
+    plain = solve_study(smoke_version(load_config("mapd-barefoot")))
+    before = goal_values(plain.last_motion, plain.walker.weight, config.cost.comfort_ranges)
+    total = sum(weight * before[name] for name, weight in weights.items())
+    assert sum(terms[name] for name in weights) < 0.9 * total
+
+
+@pytest.mark.parametrize(
+    ("problem", "changes", "sentence"),
+    [
+        ("mapd-barefoot", {"goals": {"speed": 1.0}}, "names 'speed'.*crouch"),
+        ("mapd-barefoot", {"goals": {"crouch": -1.0}}, "goals.crouch"),
+        ("mapd-barefoot", {"goals": {"discomfort": 1.0}}, "add comfort_ranges"),
+        ("mapd-barefoot", {"comfort_ranges": {"knee": (0.0, 1.0)}}, "names 'knee'.*knee_r"),
+        ("mapd-barefoot", {"comfort_ranges": {"knee_r": (1.0, 0.0)}}, "upside down"),
+        ("mapd-barefoot", {"activation_power": 1}, "activation_power"),
+        ("ls-barefoot", {"goals": {"crouch": 1.0}}, "follows a recording"),
+        ("mapd-healthy", {"goals": {"asymmetry": 1.0}}, "symmetric already"),
+    ],
+)
+def test_goals_that_cannot_be_are_refused(
+    problem: str, changes: dict[str, Any], sentence: str
+) -> None:
+    with pytest.raises(ConfigError, match=sentence):
+        with_values(load_config(problem), {f"cost.{key}": v for key, v in changes.items()})
+
+
+def test_ranges_are_of_coordinates_that_are_angles() -> None:
+    assert "pelvis_tz" not in COMFORT_COORDINATES
+    assert len(COMFORT_COORDINATES) == 8
