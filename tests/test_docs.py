@@ -18,9 +18,9 @@ from conftest import MadeSolution
 from pathwalker_cli import __version__, load_patient
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS
+from pathwalker_cli.goals import GOALS
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.yaml_file import read_mapping, validate
-from pathwalker_cli.goals import GOALS
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.output.figures import FIGURES
 from pathwalker_cli.output.run_folder import ENTRIES
