@@ -23,7 +23,7 @@ from pathwalker_cli.model.walker import ANKLES
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.output.ankle_profile import ankle_torque_line
-from pathwalker_cli.output.cycle import own_cycle, quadrature_weights
+from pathwalker_cli.output.cycle import own_cycle
 from pathwalker_cli.output.feet import centre_of_pressure, stance
 from pathwalker_cli.output.figures import (
     FIGURES,
@@ -99,7 +99,7 @@ def test_effort_of_constant_activation(metrics: GaitMetrics) -> None:
 
 
 def test_quadrature_is_exact_for_its_polynomials(series: GaitSeries) -> None:
-    weights, end = quadrature_weights(series), series.duration
+    weights, end = series.quadrature, series.duration
     for power in range(5):
         expected = end ** (power + 1) / (power + 1)
         assert weights @ series.time**power == pytest.approx(expected, rel=1e-12)

@@ -13,7 +13,7 @@ from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.model.muscle import excitation_from_rate, generators
 from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
 from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
-from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
+from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 
 __all__ = ["GaitSeries", "actuator_torques", "gait_series"]
 
@@ -73,6 +73,18 @@ class GaitSeries:
     def contact_position(self) -> np.ndarray:
         """Positions of the contact points, x and z [m], shape (n, 4, 2)."""
         return np.array([self.walker.contact_points(q) for q in self.q])
+
+    @cached_property
+    def quadrature(self) -> np.ndarray:
+        """Weights w [s] with sum(w * f) = integral of f over the stride, shape (n,).
+
+        The rule of the Radau points, exact for polynomials of degree 2 d - 2 on every interval.
+        """
+        parts = [np.zeros(1)]
+        for phase in self.motion.phases:
+            steps = phase.duration * np.diff(phase.mesh)
+            parts.append(np.outer(steps, quadrature_weights(phase.degree)[1]).ravel())
+        return np.concatenate(parts)
 
     @property
     def duration(self) -> float:

@@ -6,7 +6,6 @@ import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, SUFFIX, Side
 from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.output.cycle import quadrature_weights
 from pathwalker_cli.output.feet import toe_bearing
 
 __all__ = ["ankle_torque_line", "ankle_torque_slope"]
@@ -28,7 +27,7 @@ def ankle_torque_line(series: GaitSeries, side: Side) -> tuple[float, float]:
     NaN if the ankle does not move.
     """
     rows, name = toe_bearing(series, side), f"ankle_{SUFFIX[side]}"
-    angle, weight = -series.column(name)[rows], quadrature_weights(series)[rows]
+    angle, weight = -series.column(name)[rows], series.quadrature[rows]
     torque = series.net_torque[rows, COORDINATES.index(name)]
     weight = weight / weight.sum()
     middle = float(weight @ angle)

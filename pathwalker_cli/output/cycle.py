@@ -1,4 +1,4 @@
-"""Events of a stride, the gait cycle of each side and integrals over time."""
+"""Events of a stride and the gait cycle of each side."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.ocp.phased import collocation_times
 from pathwalker_cli.ocp.series import GaitSeries
 
 __all__ = [
@@ -20,7 +19,6 @@ __all__ = [
     "OwnCycle",
     "foot_strike_time",
     "own_cycle",
-    "quadrature_weights",
     "switching_times",
     "toe_off_time",
 ]
@@ -90,16 +88,3 @@ def own_cycle(series: GaitSeries, side: Side) -> OwnCycle:
     percent = 100.0 * (series.time[index] + later - series.time[first]) / duration
     toe_off = 100.0 * ((toe_off_time(series, side) - strike) % duration) / duration
     return OwnCycle(side, index, percent, toe_off)
-
-
-def quadrature_weights(series: GaitSeries) -> np.ndarray:
-    """Return w [s] with sum(w * f) = integral of f over the stride, shape (n,).
-
-    The rule of the Radau points, exact for polynomials of degree 2 d - 2 on every mesh interval.
-    """
-    parts = [np.zeros(1)]
-    for phase in series.motion.phases:
-        points, powers = collocation_times(phase.degree), np.arange(phase.degree)
-        rule = np.linalg.solve(points[None, :] ** powers[:, None], 1.0 / (powers + 1.0))
-        parts.append(np.outer(phase.duration * np.diff(phase.mesh), rule).ravel())
-    return np.concatenate(parts)

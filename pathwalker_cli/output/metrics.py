@@ -16,7 +16,6 @@ from pathwalker_cli.output.ankle_profile import ankle_torque_slope
 from pathwalker_cli.output.cycle import (
     BOTH_SIDES,
     foot_strike_time,
-    quadrature_weights,
     switching_times,
     toe_off_time,
 )
@@ -193,7 +192,7 @@ def _loads(series: GaitSeries) -> dict[str, Any]:
 
 def _energetics(series: GaitSeries) -> dict[str, Any]:
     """Return the metrics of activation and work."""
-    effort = float(quadrature_weights(series) @ (series.activation**2).sum(axis=1))
+    effort = float(series.quadrature @ (series.activation**2).sum(axis=1))
     muscle = _work(series, series.muscle_torque, GENERATOR_ROWS)
     orthosis = _work(series, series.orthosis_torque, ANKLES)
     peaks = series.activation.max(axis=0).tolist()
@@ -272,7 +271,7 @@ def _work(
         coordinates: Position of the coordinate that each of the m actuators drives.
     """
     power = torque * series.v[:, list(coordinates)]
-    weights = quadrature_weights(series)
+    weights = series.quadrature
     positive, negative = np.maximum(power, 0.0), np.minimum(power, 0.0)
     return float(weights @ positive.sum(axis=1)), float(weights @ negative.sum(axis=1))
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.ocp.balance import balance
 from pathwalker_cli.ocp.goal_costs import goal_values
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output.metrics import gait_metrics
@@ -110,6 +111,7 @@ def _proof(solution: GaitSolution, residual: float) -> dict[str, Any]:
         "reintegration_position_error": errors.worst_position,
         "reintegration_velocity_error": errors.worst_velocity,
         "second_engine_residual": residual,
+        "balance": asdict(balance(solution.last_iterate)),
         "active_bounds": [str(bound) for bound in solution.active],
         "stiffness_ranges": stiffness_ranges(solution),
         "bound_sources": solution.bounds.sources,

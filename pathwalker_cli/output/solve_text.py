@@ -76,11 +76,18 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
         ("largest violation", f"{worst.amount:.1e} ({worst.name})"),
         ("re-integration error", again),
         ("second engine", f"equations of motion met within {solution.second_engine:.1e} N or N m"),
+        ("balances", _balance_text(metrics["balance"])),
         ("iterations", f"{', '.join(stages)}; {solution.last_motion.intervals} intervals at last"),
         ("seconds", ", ".join(seconds)),
         ("dynamics, start", f"{solution.walker.backend}, {solution.start}"),
     ]
     return [*rows, *(("active bound", line) for line in bound_lines(solution))]
+
+
+def _balance_text(found: Mapping[str, float]) -> str:
+    energy = f"{found['energy']:.1e} J of {found['work_scale']:.3g} J"
+    momentum = f"{found['impulse']:.1e} N s of {found['impulse_scale']:.3g} N s"
+    return f"work and energy within {energy}, forces and momentum within {momentum}"
 
 
 def _sum_text(terms: Mapping[str, float]) -> str:

@@ -18,7 +18,6 @@ from pathwalker_cli.ocp.neighbourhood import Neighbourhood
 from pathwalker_cli.ocp.resolve import Optimum, Resolver
 from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
-from pathwalker_cli.output.cycle import quadrature_weights
 from pathwalker_cli.patient_blocks import RealSpring
 from pathwalker_cli.studies.edges import Edge, find_edge
 from pathwalker_cli.studies.springs import ends, spring_ranges
@@ -295,7 +294,7 @@ def _nearest(springs: Sequence[RealSpring], stiffness: float) -> list[RealSpring
 def _stops(series: GaitSeries) -> Iterator[StopVerdict]:
     """Yield how far the ankles go into every hard stop."""
     assert series.walker.orthosis is not None
-    weights = quadrature_weights(series)
+    weights = series.quadrature
     rows = dict(zip(SIDES, ANKLES, strict=True))
     for side, fixed in zip(SIDES, series.walker.orthosis, strict=True):
         angle = series.q[:, rows[side]]
