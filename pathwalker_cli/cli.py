@@ -45,6 +45,16 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "evaluate_command",
         "Compare predicted gait with the recordings of the patient.",
     ),
+    "verify": (
+        "pathwalker_cli.commands.verify",
+        "verify_command",
+        "Check run folders: files, equations of motion, balances, optimality.",
+    ),
+    "rerun": (
+        "pathwalker_cli.commands.verify",
+        "rerun_command",
+        "Solve a run again from its folder alone and tell how the two differ.",
+    ),
     "reproduce": (
         "pathwalker_cli.commands.reproduce",
         "reproduce_command",

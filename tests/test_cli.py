@@ -398,7 +398,7 @@ def test_a_warm_start_hands_over_the_exact_motion(
     assert np.array_equal(given.phases[3].states, made_solution().last_motion.phases[3].states)
     metrics = load_run("new").metrics
     assert (metrics["start"], metrics["warm_start"]) == ("earlier run", str(made_run))
-    assert metrics["input_hashes"].keys() == {"config", "patient", "warm_start"}
+    assert metrics["input_hashes"].keys() == {"config", "patient", "patient_kept", "warm_start"}
 
 
 def reports(progress: Progress) -> None:
@@ -505,7 +505,7 @@ def smoke(tmp_path_factory: pytest.TempPathFactory) -> Smoke:
 def test_the_smoke_solve_converges(smoke: Smoke) -> None:
     folder, done = smoke
     assert done.returncode == 0, done.stderr
-    assert {path.name for path in folder.iterdir()} == ENTRIES - {"NOT_CONVERGED.txt"}
+    assert {path.name for path in folder.iterdir()} == ENTRIES - {"NOT_CONVERGED.txt", "recordings"}
     assert "status                        converged" in done.stdout
     assert "tracking   iteration    0" in done.stderr
     assert "\x1b" not in done.stdout + done.stderr, "no colours off a terminal"

@@ -224,7 +224,7 @@ def spelled_out(cell: str) -> set[str]:
 def test_conventions_name_every_key_of_the_metrics(made_solution: MadeSolution) -> None:
     text = text_of("docs/conventions.md")
     for problem in PROBLEMS:
-        metrics = run_metrics(made_solution(problem), RunInputs({}))
+        metrics = run_metrics(made_solution(problem), RunInputs({}, ""))
         missing = [key for key in (*metrics, "motion_hash") if f"`{key}`" not in text]
         assert not missing
 

@@ -26,7 +26,7 @@ LAYERS = (
     {"config"},
     {"ocp", "inverse"},
     {"output"},
-    {"evaluation"},
+    {"evaluation", "verification"},
     {"studies"},
     {"reproduce"},
     {"commands"},
@@ -59,7 +59,7 @@ CONFINED = {
     "distributed": ("studies.batch.cluster",),
     "ezc3d": ("io",),
     "pebble": ("studies.batch.local",),
-    "yaml": ("io", "output.run_folder"),
+    "yaml": ("io",),
 }
 """Libraries and the parts of the package that may import them."""
 

@@ -73,7 +73,11 @@ def test_a_run_comes_back_exactly(run: Path, made_solution: MadeSolution) -> Non
 
 
 def test_a_run_folder_holds_everything(run: Path) -> None:
-    assert {path.name for path in run.iterdir()} == ENTRIES - {"NOT_CONVERGED.txt", "figures"}
+    assert {path.name for path in run.iterdir()} == ENTRIES - {
+        "NOT_CONVERGED.txt",
+        "figures",
+        "recordings",
+    }
     assert (run / "log.txt").read_text(encoding="utf-8") == "line 1\nline 2\n"
     assert load_config(run / "config.resolved.yaml") == load_run(run).config
     assert read_trajectory(run / "forces.csv", missing=True).time.size > 90
@@ -84,7 +88,8 @@ def test_figures_are_written(tmp_path: Path, made_solution: MadeSolution) -> Non
     write_run(tmp_path / "run", made_solution())
     names = {path.name for path in (tmp_path / "run" / "figures").iterdir()}
     assert {"joint_angles.png", "joint_angles.svg", "orthosis_curves.png"} <= names
-    assert ENTRIES - {"NOT_CONVERGED.txt"} == {path.name for path in (tmp_path / "run").iterdir()}
+    expected = ENTRIES - {"NOT_CONVERGED.txt", "recordings"}
+    assert {path.name for path in (tmp_path / "run").iterdir()} == expected
 
 
 def test_metrics_are_strict_json_with_the_keys_that_scripts_rely_on(run: Path) -> None:
@@ -113,7 +118,7 @@ def test_metrics_are_strict_json_with_the_keys_that_scripts_rely_on(run: Path) -
     assert metrics["reintegration_position_error"] == 5e-4
     assert metrics["dorsiflexion_stiffness_left"] == STIFFNESS[1]
     assert metrics["active_bounds"][0] == "knee_l lower 0.264 in left_toe"
-    assert set(metrics["input_hashes"]) == {"config", "patient"}
+    assert set(metrics["input_hashes"]) == {"config", "patient", "patient_kept"}
 
 
 def test_numbers_that_json_does_not_know_become_null(

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pathwalker_cli.errors import ConfigError, InputError
 from pathwalker_cli.io.refusals import KeyPath, Lines, dotted, place, sentence
 
-__all__ = ["KeyPath", "Lines", "load_yaml", "read_mapping", "validate"]
+__all__ = ["KeyPath", "Lines", "load_yaml", "read_mapping", "validate", "yaml_text"]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -192,3 +192,13 @@ def _not_finite(value: Any, prefix: KeyPath = ()) -> KeyPath:
         if found:
             return found
     return ()
+
+
+def yaml_text(content: Mapping[str, Any], heading: str) -> str:
+    """Return content as YAML below a comment.
+
+    Args:
+        content: Plain values by key.
+        heading: One line that says what it is.
+    """
+    return f"# {heading}\n{yaml.safe_dump(content, sort_keys=False, allow_unicode=True)}"

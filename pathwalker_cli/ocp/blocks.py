@@ -260,12 +260,16 @@ class BlockProgram:
         """
         return self._functions
 
+    def plain_functions(self) -> Mapping[str, ca.Function]:
+        """Return the same from expressions derived anew, for CasADi's virtual machine."""
+        return mapped_functions(self._assembly, [o.block.functions for o in self.occurrences])
+
     @cached_property
     def _functions(self) -> Mapping[str, ca.Function]:
         tapes = [o.block.tapes for o in self.occurrences] if kernels() is not None else [None]
         known = [of_block for of_block in tapes if of_block is not None]
         if len(known) < len(tapes):
-            return mapped_functions(self._assembly, [o.block.functions for o in self.occurrences])
+            return self.plain_functions()
         return taped_functions(self._assembly, known)
 
     @cached_property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
@@ -22,6 +23,7 @@ __all__ = [
     "Reintegration",
     "Violation",
     "active_bounds",
+    "equation_residual",
     "largest_violations",
     "reintegrate",
     "second_engine_residual",
@@ -233,3 +235,19 @@ def second_engine_residual(series: GaitSeries) -> float:
         residual = needed - walker.joint_torques(muscle, orthosis) - series.reserve[k]
         worst = max(worst, float(np.abs(residual).max()))
     return worst
+
+
+def equation_residual(series: GaitSeries, walker: Walker) -> float:
+    """Return the largest violation of the equations of motion by a walker's own back end [N, N m].
+
+    Args:
+        series: The stride.
+        walker: The same walker, of any back end.
+    """
+    body, n = walker.rigid_body, len(COORDINATES)
+    q, v, vdot, force = (ca.SX.sym(name, k) for name, k in (("q", n), ("v", n), ("a", n), ("f", 8)))
+    theta = ca.DM(body.parameters)
+    balance = body.inverse_dynamics(q, v, vdot, theta) - body.point_jacobian(q, theta).T @ force
+    needed = ca.Function("needed", [q, v, vdot, force], [balance]).map(len(series.time))
+    found = np.asarray(needed(series.q.T, series.v.T, series.vdot.T, series.force.T)).T
+    return float(np.abs(found - series.net_torque - series.reserve).max())

@@ -13,16 +13,18 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import yaml
 
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.io.json_file import write_json
+from pathwalker_cli.io.recordings import write_recording
+from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.ocp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.ocp.solution import GaitSolution
+from pathwalker_cli.ocp.start import start_recording
 from pathwalker_cli.output.figures import save_figures
 from pathwalker_cli.output.motion_file import read_motion, write_motion
 from pathwalker_cli.output.multipliers_file import read_multipliers, write_multipliers
@@ -37,21 +39,29 @@ from pathwalker_cli.output.run_metrics import (
 from pathwalker_cli.output.tables import TABLES
 
 __all__ = [
+    "CONFIG",
     "ENTRIES",
+    "PATIENT",
     "Run",
     "check_target",
     "config_text",
     "load_run",
+    "repeatable_config",
     "warm_start_run",
     "write_run",
 ]
 
-_CONFIG, _METRICS, _MOTION = "config.resolved.yaml", "metrics.json", "motion.npz"
+CONFIG: Final = "config.resolved.yaml"
+"""The config of a run with every value written out."""
+PATIENT: Final = "patient.yaml"
+"""The patient of a run, so that the folder is enough to verify and to repeat it."""
+_METRICS, _MOTION, _RECORDINGS = "metrics.json", "motion.npz", "recordings"
 _MULTIPLIERS: Final = "multipliers.npz"
 _SEAL: Final = "NOT_CONVERGED.txt"
 
 ENTRIES: Final = frozenset(
-    {_CONFIG, _METRICS, _MOTION, _MULTIPLIERS, _SEAL, "log.txt", "figures", *TABLES}
+    {CONFIG, PATIENT, _METRICS, _MOTION, _MULTIPLIERS, _RECORDINGS, _SEAL, "log.txt", "figures"}
+    | set(TABLES)
 )
 """Everything that a run folder holds; a folder with anything else is never replaced."""
 
@@ -77,8 +87,7 @@ class Run:
 
 def config_text(config: StudyConfig) -> str:
     """Return a config with all defaults filled in, as YAML that `load_config` reads."""
-    content = yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
-    return f"# The config of this run, every value written out.\n{content}"
+    return yaml_text(config.model_dump(mode="json"), "The config of this run, every value written.")
 
 
 def write_run(
@@ -103,10 +112,13 @@ def write_run(
         DataError: If the folder holds something else, or cannot be written.
     """
     text = config_text(solution.config)
-    metrics = run_metrics(solution, inputs or run_inputs(text, solution.walker.patient))
+    inputs = inputs or run_inputs(text, solution.walker.patient)
+    metrics = run_metrics(solution, inputs)
     metrics |= more or {}
     with _staged(Path(folder)) as staging:
-        (staging / _CONFIG).write_text(text, encoding="utf-8")
+        (staging / CONFIG).write_text(text, encoding="utf-8")
+        (staging / PATIENT).write_text(inputs.patient, encoding="utf-8")
+        _keep_recording(staging, solution)
         (staging / "log.txt").write_text("".join(f"{line}\n" for line in log), encoding="utf-8")
         write_motion(staging / _MOTION, solution.last_motion)
         metrics["motion_hash"] = sha256((staging / _MOTION).read_bytes())
@@ -118,6 +130,14 @@ def write_run(
             (staging / _SEAL).write_text(_seal(solution), encoding="utf-8")
         write_json(staging / _METRICS, metrics)
     return metrics
+
+
+def _keep_recording(folder: Path, solution: GaitSolution) -> None:
+    """Write the recording that a run began with or followed, where the patient's would stand."""
+    start = solution.config.start
+    if start.gait == "recorded":
+        recording = start_recording(solution.walker, start)
+        write_recording(folder / _RECORDINGS / start.condition, recording)
 
 
 def _write_series(folder: Path, series: GaitSeries) -> None:
@@ -223,12 +243,19 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
     if (folder / _MULTIPLIERS).exists():
         multipliers = read_multipliers(folder / _MULTIPLIERS)
         _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
-    config = load_config(_file(folder, _CONFIG))
+    config = load_config(_file(folder, CONFIG))
     expected = len(STIFFNESSES) if config.condition == "orthosis" else 0
     if config.problem != metrics["problem"] or motion.parameters.size != expected:
-        where = str(folder / _CONFIG)
+        where = str(folder / CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)
     return Run(folder, metrics, motion, config, multipliers)
+
+
+def repeatable_config(run: Run) -> StudyConfig:
+    """Return the config of a run for the patient that its folder keeps, if it keeps one."""
+    kept = run.folder / PATIENT
+    patient = str(kept.resolve()) if kept.is_file() else run.config.patient
+    return run.config.model_copy(update={"patient": patient})
 
 
 def _check_hash(path: Path, expected: str | None) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.ocp.balance import balance
 from pathwalker_cli.ocp.goal_costs import goal_values
 from pathwalker_cli.ocp.solution import GaitSolution
@@ -31,11 +32,14 @@ class RunInputs:
     """What a run was made from, taken before the solve: files may change while it lasts.
 
     Args:
-        hashes: SHA-256 of the resolved config, of the patient's file and of an earlier motion.
+        hashes: SHA-256 of the resolved config, of the patient's file, of what is kept of the
+            patient, and of an earlier motion.
+        patient: The patient as YAML in one piece.
         warm_start: Run that it began with; "" without one.
     """
 
     hashes: Mapping[str, str]
+    patient: str
     warm_start: str = ""
 
 
@@ -51,15 +55,22 @@ def run_inputs(
 
     Args:
         config_text: The resolved config as text.
-        patient: The patient.
+        patient: The patient, without variation.
         warm_start: Folder of the run to begin with.
     """
-    hashes = {"config": sha256(config_text.encode())}
+    kept = _patient_text(patient)
+    hashes = {"config": sha256(config_text.encode()), "patient_kept": sha256(kept.encode())}
     if patient.source is not None:
         hashes["patient"] = sha256(patient.content)
     if warm_start is not None:
         hashes["warm_start"] = sha256((Path(warm_start) / "motion.npz").read_bytes())
-    return RunInputs(hashes, "" if warm_start is None else str(warm_start))
+    return RunInputs(hashes, kept, "" if warm_start is None else str(warm_start))
+
+
+def _patient_text(patient: Patient) -> str:
+    """Return a patient as YAML that `load_patient` reads, the orthosis in its place."""
+    content = patient.model_dump(mode="json", exclude_none=True)
+    return yaml_text(content, "The patient of this run, before any variation of the config.")
 
 
 def stiffness_ranges(solution: GaitSolution) -> dict[str, tuple[float, float]]:

@@ -20,6 +20,7 @@ from pathwalker_cli.output.run_folder import (
     write_run,
 )
 from pathwalker_cli.output.run_metrics import RunInputs, run_inputs
+from pathwalker_cli.patient import load_patient
 from pathwalker_cli.studies.verdict import Verdict, verdict_of
 from pathwalker_cli.studies.verdict_text import verdict_lines
 
@@ -80,7 +81,7 @@ def run_study(
     log = log or RunLog()
     check_target(folder)
     earlier = None if warm_start is None else warm_start_run(warm_start, study)
-    inputs = run_inputs(config_text(study), study_patient(study), warm_start)
+    inputs = run_inputs(config_text(study), load_patient(study.patient), warm_start)
     solution = _solve(study, earlier, log)
     verdict = verdict_of(solution) if study.verdict else None
     lines = [*_log_lines(solution, inputs, log), *_verdict_lines(verdict)]

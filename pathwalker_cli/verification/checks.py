@@ -1,0 +1,285 @@
+"""All that can be checked of a run folder without solving again."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.ocp.balance import balance
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.cost_terms import cost_terms
+from pathwalker_cli.ocp.goal_costs import goal_values
+from pathwalker_cli.ocp.optimality import optimality
+from pathwalker_cli.ocp.series import GaitSeries, gait_series
+from pathwalker_cli.ocp.solve import GaitSolver
+from pathwalker_cli.ocp.verify import equation_residual, reintegrate, second_engine_residual
+from pathwalker_cli.output.metrics import gait_metrics
+from pathwalker_cli.output.run_folder import CONFIG, PATIENT, Run, load_run, repeatable_config
+from pathwalker_cli.output.run_metrics import sha256
+from pathwalker_cli.output.tables import TABLES
+
+__all__ = ["Check", "Verification", "verify_run"]
+
+_SAME: Final = 1e-6
+"""Relative difference up to which two numbers of a file count as the same."""
+_EQUATIONS: Final = 1e-6
+"""Largest residual of the equations of motion [N, N m]."""
+_ENERGY, _MOMENTUM = 1e-3, 1e-5
+"""Largest share of work and of impulse that a balance may miss."""
+_SLACK: Final = 10.0
+"""How much more than the solver's tolerance the conditions may be off when evaluated anew."""
+_SHOOTING: Final = "solved by multiple shooting: its run folder holds a description only"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was checked.
+
+    Args:
+        name: What.
+        value: What was found; None where it does not apply.
+        limit: What is allowed.
+        unit: Unit of both, "" for a count.
+        note: What differs, or why it does not apply.
+    """
+
+    name: str
+    value: float | None
+    limit: float
+    unit: str
+    note: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is within its limit, or does not apply."""
+        return self.value is None or self.value <= self.limit
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All checks of a run.
+
+    Args:
+        folder: The run folder.
+        problem: Its problem.
+        patient: Id of its patient.
+        checks: The checks.
+    """
+
+    folder: Path
+    problem: str
+    patient: str
+    checks: tuple[Check, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether all checks passed."""
+        return all(check.passed for check in self.checks)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it ready for JSON."""
+        checks = [asdict(check) | {"passed": check.passed} for check in self.checks]
+        return {
+            "folder": str(self.folder),
+            "problem": self.problem,
+            "patient": self.patient,
+            "passed": self.passed,
+            "checks": checks,
+        }
+
+
+def verify_run(folder: str | Path) -> Verification:
+    """Check a run from its files alone.
+
+    Args:
+        folder: The folder of a converged run.
+
+    Raises:
+        DataError: If it is no run folder, or a file of it is missing, damaged or foreign.
+        NotConvergedError: If the run did not converge.
+    """
+    run = load_run(folder)
+    config = repeatable_config(run)
+    solver = GaitSolver(config)
+    series = gait_series(solver.walker, run.motion)
+    checks = (
+        *_files(run, series),
+        *_numbers(run, solver, series),
+        *_dynamics(run, config, series),
+        *_solution(run, solver),
+    )
+    return Verification(Path(folder), config.problem, solver.walker.patient.id, checks)
+
+
+def _files(run: Run, series: GaitSeries) -> Iterator[Check]:
+    """Yield whether config, patient and tables are those that the run was written with."""
+    hashes = run.metrics["input_hashes"]
+    for name, key in ((CONFIG, "config"), (PATIENT, "patient_kept")):
+        if key in hashes:
+            same = sha256((run.folder / name).read_bytes()) == hashes[key]
+            yield Check(name, float(not same), 0.0, "", "" if same else "changed since the run")
+    with tempfile.TemporaryDirectory() as made:
+        for name, write in TABLES.items():
+            write(Path(made) / name, series)
+            yield _same_table(run.folder / name, Path(made) / name)
+
+
+def _same_table(path: Path, expected: Path) -> Check:
+    """Return the largest relative difference of two tables."""
+    if not path.is_file():
+        raise DataError("is missing", where=str(path), mend="solve again")
+    try:
+        found = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+    except (OSError, UnicodeDecodeError):
+        raise DataError("is damaged", where=str(path), mend="solve again") from None
+    wanted = [line.split(",") for line in expected.read_text(encoding="utf-8").splitlines()]
+    if [len(row) for row in found] != [len(row) for row in wanted] or found[:1] != wanted[:1]:
+        return Check(path.name, math.inf, _SAME, "relative", "has other rows or columns")
+    worst, place = 0.0, ""
+    scale = _column_scales(wanted)
+    for i, (mine, other) in enumerate(zip(found[1:], wanted[1:], strict=True), start=2):
+        for j, (one, two) in enumerate(zip(mine, other, strict=True)):
+            difference = 0.0 if one == two else _difference(one, two, scale[j])
+            if difference > worst:
+                worst, place = difference, f"line {i}, {wanted[0][j]}"
+    return Check(path.name, worst, _SAME, "relative", f"in {place}" if place else "")
+
+
+def _column_scales(rows: list[list[str]]) -> list[float]:
+    """Return the largest amount in every column; 1 where there is none."""
+    columns = zip(*rows[1:], strict=True)
+    return [max((abs(_number(cell)) for cell in column), default=0.0) or 1.0 for column in columns]
+
+
+def _number(cell: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        return 0.0
+    return value if math.isfinite(value) else 0.0
+
+
+def _difference(one: str, two: str, scale: float) -> float:
+    """Return the difference of two cells by the scale of their column; infinite if not numbers."""
+    try:
+        difference = abs(float(one) - float(two)) / scale
+    except ValueError:
+        return math.inf
+    return difference if math.isfinite(difference) else math.inf
+
+
+def _numbers(run: Run, solver: GaitSolver, series: GaitSeries) -> Iterator[Check]:
+    """Yield whether metrics.json says what follows from the motion."""
+    metrics, ranges = run.metrics, run.config.cost.comfort_ranges
+    made: dict[str, Any] = gait_metrics(series).as_dict()
+    if run.config.transcription == "collocation":
+        terms = cost_terms(run.motion, solver.gait, solver.weights, solver.samples)
+        made |= {"cost_terms": terms, "cost": sum(terms.values())}
+    if "goals" in metrics:
+        made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)
+    worst, place = 0.0, ""
+    for key, value in _flat(made):
+        difference = _apart(_at(metrics, key), value)
+        if difference > worst:
+            worst, place = difference, ".".join(key)
+    yield Check("metrics.json", worst, _SAME, "relative", f"in {place}" if place else "")
+
+
+def _flat(content: Any, key: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield every single value with its place."""
+    if isinstance(content, Mapping):
+        for name, entry in content.items():
+            yield from _flat(entry, (*key, str(name)))
+    elif isinstance(content, list | tuple):
+        for i, entry in enumerate(content):
+            yield from _flat(entry, (*key, str(i)))
+    else:
+        yield key, content
+
+
+def _at(content: Any, key: tuple[str, ...]) -> Any:
+    """Return the value at a place, None where there is none."""
+    for name in key:
+        if isinstance(content, list) and name.isdigit() and int(name) < len(content):
+            content = content[int(name)]
+        elif isinstance(content, Mapping):
+            content = content.get(name)
+        else:
+            return None
+    return content
+
+
+def _apart(one: Any, two: Any) -> float:
+    """Return the relative difference of two values; infinite if only one is a number."""
+    numbers = [isinstance(value, int | float) for value in (one, two)]
+    if all(numbers):
+        size = max(abs(one), abs(two), 1e-3)
+        return float(abs(one - two) / size)
+    return 0.0 if one == two else math.inf
+
+
+def _dynamics(run: Run, config: StudyConfig, series: GaitSeries) -> Iterator[Check]:
+    """Yield engines, integrator and conservation laws."""
+    if config.transcription != "collocation":
+        yield Check("dynamics", None, 0.0, "", _SHOOTING)
+        return
+    walker, mesh = series.walker, config.mesh
+    unit = "N or N m"
+    yield Check("numeric Pinocchio", second_engine_residual(series), _EQUATIONS, unit)
+    for backend in dict.fromkeys((walker.backend, "direct")):
+        other = build_walker(walker.patient, config.condition, config.model.published, backend)
+        yield Check(f"back end {backend}", equation_residual(series, other), _EQUATIONS, unit)
+    errors = reintegrate(walker, run.motion)
+    refined = mesh.refinements > 0
+    note = "" if refined else "the mesh was not to be refined"
+    for name, error, limit, unit in (
+        ("position", errors.worst_position, mesh.position_tolerance, "rad or m"),
+        ("velocity", errors.worst_velocity, mesh.velocity_tolerance, "rad/s or m/s"),
+    ):
+        yield Check(f"re-integrated {name}", error if refined else None, limit, unit, note)
+    found = balance(series)
+    shares = (
+        ("work against energy", found.energy / found.work_scale, _ENERGY),
+        ("work of the ground", found.contact_work / found.work_scale, _ENERGY),
+        ("impulse against momentum", found.impulse / found.impulse_scale, _MOMENTUM),
+        ("angular impulse", found.angular_impulse / found.angular_scale, _MOMENTUM),
+    )
+    for name, share, limit in shares:
+        yield Check(name, share if refined else None, limit, "share", note)
+    pull = max(0.0, -float(gait_metrics(series).min_vertical_force))
+    yield Check("ground pulls", pull, _EQUATIONS, "N")
+
+
+def _solution(run: Run, solver: GaitSolver) -> Iterator[Check]:
+    """Yield the first-order conditions of the nonlinear program."""
+    if run.config.transcription != "collocation" or run.multipliers is None:
+        why = "no multipliers are kept"
+        yield Check("optimality", None, 0.0, "", _SHOOTING if run.multipliers else why)
+        return
+    phases = run.motion.phases[: len(solver.gait.phases)]
+    motion = replace(run.motion, phases=phases)
+    program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)
+    unknowns = program.to_unknowns(motion)
+    if unknowns.size != run.multipliers.unknowns.size or (
+        program.program.rows != run.multipliers.rows.size
+    ):
+        yield Check("optimality", math.inf, 0.0, "", "multipliers of another program")
+        return
+    found, tolerances = optimality(program, unknowns, run.multipliers), run.config.solver
+    tolerance = _SLACK * tolerances.tolerance
+    # rounding of a motion that is written and read
+    met = _SLACK * tolerances.constraint_tolerance
+    scale = max(1.0, float(np.abs(unknowns).max()))
+    yield Check("rows and bounds", found.infeasibility / scale, met, "solver units")
+    yield Check("stationarity", found.stationarity, tolerance, "solver units")
+    yield Check("complementarity", found.complementarity, tolerance, "solver units")
+    yield Check("signs of multipliers", found.wrong_sign, tolerance, "solver units")

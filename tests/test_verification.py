@@ -1,0 +1,138 @@
+"""A run folder is checked from its files alone; what was tampered with is found and named."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from pathwalker_cli.cli import cli
+from pathwalker_cli.output.motion_file import read_motion, write_motion
+from pathwalker_cli.output.run_metrics import sha256
+from pathwalker_cli.verification.checks import Verification, verify_run
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a run that followed a recording: the quickest that meets its mesh tolerance."""
+    folder = tmp_path_factory.mktemp("runs") / "fit"
+    words = ["solve", "ls-barefoot", "ls-barefoot", "--out", str(folder), "--quiet"]
+    assert CliRunner().invoke(cli, words).exit_code == 0
+    return folder
+
+
+@pytest.fixture
+def run(solved: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(solved, tmp_path / "elsewhere"))
+
+
+def failed(verification: Verification) -> set[str]:
+    return {check.name for check in verification.checks if not check.passed}
+
+
+def replaced(name: str, old: str, new: str) -> Callable[[Path], None]:
+    """Return what replaces text in a file of a run."""
+
+    def tamper(run: Path) -> None:
+        text = (run / name).read_text(encoding="utf-8")
+        assert old in text
+        (run / name).write_text(text.replace(old, new, 1), encoding="utf-8")
+
+    return tamper
+
+
+def table_cell(name: str) -> Callable[[Path], None]:
+    """Return what changes one number of a table by 1 %."""
+
+    def tamper(run: Path) -> None:
+        lines = (run / name).read_text(encoding="utf-8").splitlines()
+        cells = lines[40].split(",")
+        cells[5] = f"{1.01 * float(cells[5]) + 0.01:.9g}"
+        lines[40] = ",".join(cells)
+        (run / name).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    return tamper
+
+
+def metric(key: str, factor: float) -> Callable[[Path], None]:
+    def tamper(run: Path) -> None:
+        metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+        metrics[key] *= factor
+        (run / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+
+    return tamper
+
+
+def moved(run: Path) -> None:
+    """Change the motion itself, and its hash, tables left as they were."""
+    motion = read_motion(run / "motion.npz")
+    motion.phases[2].states[1, 5] += 1e-3
+    motion.phases[2].inner_states[0, -1, 5] += 1e-3
+    write_motion(run / "motion.npz", motion)
+    metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+    metrics["motion_hash"] = sha256((run / "motion.npz").read_bytes())
+    (run / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+
+
+def test_a_run_is_in_order_wherever_it_stands(run: Path) -> None:
+    found = verify_run(run)
+    assert found.passed, failed(found)
+    assert len(found.checks) >= 20
+    assert all(check.value is not None for check in found.checks)
+    done = CliRunner().invoke(cli, ["verify", str(run)])
+    assert done.exit_code == 0
+    assert "All checks passed." in done.output
+    told = json.loads(CliRunner().invoke(cli, ["verify", str(run), "--json"]).stdout)
+    assert told["runs"][0]["passed"] is True
+
+
+@pytest.mark.parametrize(
+    ("tamper", "names"),
+    [
+        (table_cell("states.csv"), {"states.csv"}),
+        (table_cell("forces.csv"), {"forces.csv"}),
+        (metric("walking_speed", 1.001), {"metrics.json"}),
+        (metric("cost", 0.99), {"metrics.json"}),
+        (replaced("patient.yaml", "height: 1.25", "height: 1.26"), {"patient.yaml"}),
+        (replaced("config.resolved.yaml", "friction: 0.8", "friction: 0.7"),
+         {"config.resolved.yaml"}),
+        (moved, {"states.csv", "numeric Pinocchio", "rows and bounds"}),
+    ],
+    ids=["table", "forces", "metric", "cost", "patient", "config", "motion"],
+)  # fmt: skip
+def test_what_was_tampered_with_is_found(
+    run: Path, tamper: Callable[[Path], None], names: set[str]
+) -> None:
+    tamper(run)
+    found = verify_run(run)
+    assert names <= failed(found)
+    done = CliRunner().invoke(cli, ["verify", str(run)])
+    assert done.exit_code == 1
+    assert "FAILED" in done.output
+
+
+@pytest.mark.parametrize("name", ["motion.npz", "multipliers.npz", "metrics.json", "states.csv"])
+@pytest.mark.parametrize("share", [0.0, 0.99])
+def test_a_truncated_file_is_refused_or_found(run: Path, name: str, share: float) -> None:
+    content = (run / name).read_bytes()
+    (run / name).write_bytes(content[: int(share * len(content))])
+    done = CliRunner().invoke(cli, ["verify", str(run)])
+    assert done.exit_code in (1, 2)
+    assert isinstance(done.exception, SystemExit)
+    assert name in done.output
+
+
+def test_a_run_comes_out_again_to_the_last_bit(run: Path) -> None:
+    done = CliRunner().invoke(cli, ["rerun", str(run)])
+    assert done.exit_code == 0, done.output
+    assert "the same to the last bit" in done.output
+    again = run.with_name("elsewhere-again")
+    for name in ("states.csv", "controls.csv", "forces.csv", "torques.csv", "motion.npz"):
+        assert (again / name).read_bytes() == (run / name).read_bytes(), name
+    one, two = (np.load(folder / "multipliers.npz") for folder in (run, again))
+    assert all(np.array_equal(one[key], two[key]) for key in one.files)
