@@ -129,7 +129,7 @@ PROOF: Final = {
     "stiffness_ranges": "by stiffness, allowed range [N m/rad]",
     "bound_sources": "by quantity, its bounds and where they come from",
     "notes": "what was filled in or overridden in the patient's file",
-    "verdict": "how sure the springs are, see [sensitivity.md](sensitivity.md): `springs` (region [N m/rad], limit, "
+    "verdict": "how sure the springs are, see [how sure is a spring](sensitivity.md): `springs` (region [N m/rad], limit, "
     "gradient and curvature of the cost relative to its size), `stops`, `snapped` to real springs, `optima`; null "
     "where there is nothing to judge",
     "local_optima": "where all starts ended, best first; empty for a single start",

@@ -69,4 +69,4 @@ def _within_docs(text: str) -> str:
     """Return a text of the folder above with links that hold in docs/."""
     for name, (page, _) in OUTSIDE.items():
         text = text.replace(f"]({name}", f"]({page}")
-    return text.replace("](docs/", "](")
+    return text.replace("](docs/", "](").replace("[docs/", "[")
