@@ -1,6 +1,7 @@
 # make demo      install into .venv and solve the main problem for the shipped patient
 # make test      install into .venv; lint, types and tests
 # make test-all  the same with the full-length solves
+# make docs      build the documentation site into site/; any dead link or stale anchor stops it
 # make clean     remove .venv and what was built
 
 PYTHON ?= python3
@@ -9,7 +10,7 @@ BIN := $(VENV)/bin
 SOURCES := pyproject.toml CMakeLists.txt \
   $(shell find pathwalker_cli native configs patient_data urdf -type f ! -name '*.pyc')
 
-.PHONY: demo test test-all check clean
+.PHONY: demo test test-all check docs clean
 
 demo: $(VENV)/installed
 	$(BIN)/pathwalker solve mapd-orthosis configs/mapd-orthosis.yaml --out runs/demo
@@ -24,6 +25,9 @@ check: $(VENV)/installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+docs: $(VENV)/installed-dev
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 # Without build isolation the extension is compiled against the very wheels that are installed, and
 # only when its own sources change.
@@ -40,8 +44,8 @@ $(VENV)/installed: $(VENV)/build-tools $(SOURCES)
 	touch $@
 
 $(VENV)/installed-dev: $(VENV)/build-tools $(SOURCES)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation ".[dev]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation ".[dev,docs]"
 	touch $@ $(VENV)/installed
 
 clean:
-	rm -rf $(VENV) build
+	rm -rf $(VENV) build site

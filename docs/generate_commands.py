@@ -21,9 +21,11 @@ _HEAD: Final = """\
 
 <!-- Written by docs/generate_commands.py from the commands themselves: change those, not this. -->
 
+Every command with its arguments, options and exit codes.
+
 `pathwalker COMMAND --help` says the same on the terminal. Every config may be named by its path or,
 if it comes with PathWalker, by its name alone (`mapd-orthosis`); its keys are in
-[configuration.md](configuration.md). `--set KEY=VALUE` overrides one key, dotted where it is nested
+[configuration](configuration.md). `--set KEY=VALUE` overrides one key, dotted where it is nested
 (`--set bounds.friction=0.6`), as often as needed.
 
 | exit code | meaning |

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from functools import cache
 from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from textwrap import dedent
 from types import ModuleType
 from typing import Any
 
@@ -16,20 +15,25 @@ import yaml
 
 from conftest import MadeSolution
 from pathwalker_cli import __version__, load_patient
+from pathwalker_cli.cli import COMMANDS
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS
 from pathwalker_cli.goals import GOALS
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.yaml_file import read_mapping, validate
 from pathwalker_cli.model.contact import PHASES
-from pathwalker_cli.output.figures import FIGURES
-from pathwalker_cli.output.run_folder import ENTRIES
 from pathwalker_cli.output.run_metrics import RunInputs, run_metrics
 from pathwalker_cli.problems import PROBLEMS
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
-GENERATED = {"commands.md": "generate_commands.py", "configuration.md": "generate_configuration.py"}
+GENERATED = {
+    "commands.md": "generate_commands.py",
+    "configuration.md": "generate_configuration.py",
+    "patient-file.md": "generate_patient_file.py",
+    "run-folder.md": "generate_run_folder.py",
+}
+CONFIGS = sorted(path.stem for path in (ROOT / "configs").glob("*.yaml"))
 LINK = re.compile(r"!?\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 # Machines, places that only exist while something is made, and how it is made.
 FORBIDDEN = re.compile(
@@ -53,15 +57,9 @@ def page_id(path: Path) -> str:
     return str(path.relative_to(ROOT))
 
 
-@cache
 def script(name: str) -> ModuleType:
-    """Import a script of the documentation."""
-    spec = spec_from_file_location(name.removesuffix(".py"), DOCS / name)
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    """Import a script of the documentation; pytest has its folder on the path."""
+    return import_module(name.removesuffix(".py"))
 
 
 def text_of(name: str) -> str:
@@ -70,8 +68,9 @@ def text_of(name: str) -> str:
 
 
 def blocks(page: str, language: str) -> list[str]:
-    """Return the code blocks of a page in a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", text_of(page), re.MULTILINE | re.DOTALL)
+    """Return the code blocks of a page in a language, also those in lists."""
+    fence = re.compile(rf"^( *)```{language}\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
+    return [dedent(text) for _, text in fence.findall(text_of(page))]
 
 
 # Generated pages
@@ -82,6 +81,29 @@ def test_generated_page_is_fresh(name: str) -> None:
     wanted = script(GENERATED[name]).page()
     mend = f"run: python docs/{GENERATED[name]}"
     assert (DOCS / name).read_text(encoding="utf-8") == wanted, mend
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_every_shipped_config_key_is_in_the_reference(name: str) -> None:
+    reference = text_of("docs/configuration.md")
+    for key in script("generate_configuration.py").reasons(ROOT / "configs" / f"{name}.yaml"):
+        parts = key.split(".")
+        above = [".".join(parts[: i + 1]) for i in range(len(parts))]
+        table = any(f"| `{place}` |" in reference for place in above)
+        assert table or f"### {key}\n" in reference, key
+
+
+def test_every_command_is_in_the_reference() -> None:
+    assert re.findall(r"^## (.*)$", text_of("docs/commands.md"), re.MULTILINE) == list(COMMANDS)
+
+
+def test_run_folder_names_every_key_of_the_metrics(made_solution: MadeSolution) -> None:
+    page = script("generate_run_folder.py")
+    groups = (page.OUTCOME, page.gait_keys(), page.PROOF, page.ORIGIN)
+    told = {key for group in groups for name in group for key in page.expanded(name)}
+    for problem in PROBLEMS:
+        written = set(run_metrics(made_solution(problem), RunInputs({}, "")))
+        assert told == written | {"verdict", "motion_hash", "multipliers_hash"}
 
 
 @pytest.mark.parametrize("problem", ["mapd-orthosis", "mapd-barefoot"])
@@ -221,19 +243,45 @@ def spelled_out(cell: str) -> set[str]:
     return found
 
 
-def test_conventions_name_every_key_of_the_metrics(made_solution: MadeSolution) -> None:
+def test_conventions_name_every_coordinate_and_force() -> None:
     text = text_of("docs/conventions.md")
-    for problem in PROBLEMS:
-        metrics = run_metrics(made_solution(problem), RunInputs({}, ""))
-        missing = [key for key in (*metrics, "motion_hash") if f"`{key}`" not in text]
-        assert not missing
-
-
-def test_conventions_name_every_file_coordinate_and_force() -> None:
-    text = text_of("docs/conventions.md")
-    files = [f"{entry}/" if entry == "figures" else entry for entry in ENTRIES]
-    for name in (*files, *COORDINATES, *GENERATORS, *CONTACT_FORCES, *FIGURES):
+    for name in (*COORDINATES, *GENERATORS, *CONTACT_FORCES):
         assert f"`{name}`" in text, name
+
+
+def test_own_cost_tells_of_every_goal() -> None:
+    found = re.findall(
+        r"^\| `goals: \{(\w+): \.\.\.\}` \|", text_of("docs/own-cost.md"), re.MULTILINE
+    )
+    assert found == list(GOALS)
+
+
+def test_own_patient_and_orthosis_are_accepted(tmp_path: Path) -> None:
+    child, barefoot, torques = blocks("docs/own-patient.md", "yaml")
+    hinge, today = blocks("docs/own-orthosis.md", "yaml")
+    shoe = "contact_points: {orthosis: {heel: [-0.055, -0.10], toe: [0.14, -0.08]}}\n"
+    (tmp_path / "anna").mkdir()
+    (tmp_path / "anna.yaml").write_text(child, encoding="utf-8")
+    worn = f"{child}{shoe}orthosis: hinge.yaml\n"
+    (tmp_path / "anna" / "patient.yaml").write_text(worn, encoding="utf-8")
+    (tmp_path / "anna" / "hinge.yaml").write_text(hinge, encoding="utf-8")
+    for name, text, problem in (("b", barefoot, "mapd-barefoot"), ("t", today, "mapd-orthosis")):
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(text, encoding="utf-8")
+        config = load_config(path, problem)
+        assert load_patient(config.patient).id == "anna"
+    assert len(config.bounds.stiffness) == 4
+    assert validate(yaml.safe_load(torques), InverseDynamicsConfig).patient == "anna/"
+
+
+def test_python_page_runs() -> None:
+    first, *others = blocks("docs/python.md", "python")
+    names: dict[str, Any] = {}
+    exec(first, names)
+    imports = [line for text in others for line in text.splitlines() if line.startswith("from ")]
+    exec("\n".join(imports), names)
+    exec(others[-1], names)
+    assert {"solve_study", "run_study", "load_run"} <= names.keys()
 
 
 def test_citation_is_complete_and_of_this_version() -> None:

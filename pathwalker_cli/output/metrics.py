@@ -53,7 +53,7 @@ class GaitMetrics:
         min_stance_knee_flexion: Per side, least knee flexion of stance [rad]: the crouch measure.
         min_stance_knee_flexion_time: Per side, when that is [s].
         joint_range: Per coordinate but the pelvis position, least and largest value [rad].
-        body_weight: Weight [N].
+        body_weight: Weight, with orthoses if they are worn [N].
         peak_vertical_force: Per side, largest vertical ground reaction force [N].
         peak_vertical_force_body_weights: The same over body weight.
         min_vertical_force: Least vertical force on a contact point in contact [N]; below zero the

@@ -1,0 +1,162 @@
+"""Write `patient-file.md`: every key of a patient's file with type, range, default and meaning.
+
+Keys, types, ranges and defaults come from the models that validate the file.
+
+python docs/generate_patient_file.py
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final, get_args, get_origin
+
+from generate_configuration import is_model, row, side_type
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from pathwalker_cli.io.fields import Sides
+from pathwalker_cli.patient import Patient
+
+PAGE: Final = Path(__file__).with_name("patient-file.md")
+
+_HEAD: Final = """\
+# Patient file
+
+<!-- Written by docs/generate_patient_file.py from the models that validate the file: change those, and
+the meanings in the script, not this. -->
+
+Every key of a patient's YAML file. [Your own patient](own-patient.md) tells how to write one; the shipped
+`patient_data/sreenivasa2017-patient/patient.yaml` is a complete example.
+
+Units are SI and radians and are never written beside a number. Angles are positive in hip extension, knee
+flexion and ankle plantarflexion ([conventions](conventions.md)). Where the type says *per side*, one value
+counts for both sides, and `{right: 18.6, left: 30.4}` tells them apart. Unknown keys and numbers outside their
+range are refused with one sentence that names file, line and key. `null` means left out.
+"""
+
+_ABOUT: Final = {
+    "segment_lengths": "Joint centre to joint centre, from motion capture or a measuring tape. Every length may "
+    "be left out: it then comes from adult proportions of body height, and every run says so.",
+    "contact_points": "Heel and toe of the rigid foot, `[forward, up]` of the ankle joint [m], with the foot at "
+    "90 degrees to the shank. One pair counts for both feet; `{right: {heel: ..., toe: ...}, left: ...}` tells them "
+    "apart.",
+    "strengths": "Maximum isometric torques. Needed for predictions, not for recorded gait; `pathwalker id` "
+    "estimates them from recordings. Given, the block must be complete.",
+    "orthosis": "Needed for problems with orthoses. The same on both legs but for the stops. `orthosis:` may also "
+    "be the path of a YAML file with this block, relative to the patient's file, that several patients share.",
+    "recorded": "What was recorded, per condition: `recorded.barefoot` and `recorded.orthosis` have the same keys. "
+    "The barefoot ones give the bounds of "
+    "are taken.",
+}
+"""What stands at the head of every block."""
+
+_SPRINGS: Final = (
+    "springs that exist, each `{name: stiff, stiffness: 91.7}`; the answer is rounded to them"
+)
+
+MEANINGS: Final = {
+    "id": "name of the patient, of run folders and of table rows",
+    "description": "for people",
+    "sex": "segment masses follow from boys in either case; for a girl every run says so",
+    "age": "segment masses follow from it",
+    "age_for_regressions": "age for the segment masses, if another one fits better, or the child is younger or "
+    "older than the regressions",
+    "age_for_regressions_reason": "why; needed with it",
+    "body_mass": "without orthoses and shoes",
+    "height": "",
+    "segment_lengths.pelvis": "height of the pelvis segment",
+    "segment_lengths.hip_drop": "hips below the pelvis origin",
+    "segment_lengths.lumbar_height": "lumbar joint above the pelvis origin",
+    "segment_lengths.trunk": "",
+    "segment_lengths.head": "",
+    "segment_lengths.shoulder_height": "shoulders above the lumbar joint",
+    "segment_lengths.upper_arm": "",
+    "segment_lengths.lower_arm": "",
+    "segment_lengths.hand": "",
+    "segment_lengths.thigh": "hip to knee",
+    "segment_lengths.shank": "knee to ankle",
+    "segment_lengths.foot": "heel marker to toe marker",
+    "contact_points.barefoot.heel": "left out: from foot length and height by proportion",
+    "contact_points.barefoot.toe": "",
+    "contact_points.orthosis.heel": "sole of the shoe that is worn with the orthosis; needed with one",
+    "contact_points.orthosis.toe": "",
+    "strengths.hip_extension": "",
+    "strengths.hip_flexion": "",
+    "strengths.knee_extension": "",
+    "strengths.knee_flexion": "",
+    "strengths.ankle_extension": "plantarflexion",
+    "strengths.ankle_flexion": "dorsiflexion",
+    "strengths.lumbar_extension": "bends the trunk forward, as in the published model",
+    "strengths.lumbar_flexion": "extends the trunk",
+    "orthosis.mass.shank": "what orthosis and shoe add to each shank",
+    "orthosis.mass.foot": "the same of each foot",
+    "orthosis.neutral_angle": "ankle angle at which the springs give no torque",
+    "orthosis.free_play": "width of the play around the neutral angle",
+    "orthosis.preload_torque": "torque at the edge of the free play, where the spring begins to work",
+    "orthosis.dorsiflexion_stop": "ankle angle of the hard stop",
+    "orthosis.plantarflexion_stop": "ankle angle of the hard stop",
+    "orthosis.stop_stiffness.dorsiflexion": "behind the stop",
+    "orthosis.stop_stiffness.plantarflexion": "behind the stop",
+    "orthosis.stiffness_guess.dorsiflexion": "K_D at which the search begins",
+    "orthosis.stiffness_guess.plantarflexion": "K_P at which the search begins",
+    "orthosis.stiffness_range.dorsiflexion": "K_D that can be had",
+    "orthosis.stiffness_range.plantarflexion": "K_P that can be had",
+    "orthosis.stiffness_range.source": "who says so",
+    "orthosis.springs.dorsiflexion": _SPRINGS,
+    "orthosis.springs.plantarflexion": _SPRINGS,
+    "orthosis.springs.source": "who says so",
+    "recorded.barefoot.walking_speed.mean": "least speed of a prediction, unless the config says another",
+    "recorded.barefoot.walking_speed.min": "",
+    "recorded.barefoot.walking_speed.max": "",
+    "recorded.barefoot.step_length.min": "from flat heel to flat heel; `right` and `left` may be told apart",
+    "recorded.barefoot.step_length.max": "",
+    "recorded.barefoot.joint_ranges": "per coordinate but the pelvis position; widened by "
+    "`bounds.joint_range_margin`, the joint ranges of a prediction",
+}
+"""What every key means; a key that is missing here stops the script."""
+
+
+def page() -> str:
+    """Return the whole page."""
+    blocks: dict[str, list[str]] = {"": []}
+    for key, field in _leaves(Patient, ""):
+        heading = key.partition(".")[0] if "." in key else ""
+        text = row(key, field, MEANINGS[key])
+        if key.startswith("contact_points."):
+            text = text.replace("[lower, upper]", "[forward, up]")
+        blocks.setdefault(heading, []).append(text)
+    parts = [_HEAD]
+    for name, rows in blocks.items():
+        parts += [f"## {name or 'The child'}\n", *([f"{_ABOUT[name]}\n"] if name else [])]
+        header = ["| key | type | allowed | default | meaning |", "| --- | --- | --- | --- | --- |"]
+        parts.append("\n".join([*header, *rows, ""]))
+    return "\n".join(parts)
+
+
+def _leaves(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, FieldInfo]]:
+    """Yield dotted name and field of every key that holds no further keys."""
+    for name, field in model.model_fields.items():
+        block = _block(field.annotation)
+        if block is None:
+            yield f"{prefix}{name}", field
+        elif name == "recorded":
+            yield from _leaves(block, f"{prefix}{name}.barefoot.")
+        else:
+            yield from _leaves(block, f"{prefix}{name}.")
+
+
+def _block(annotation: Any) -> type[BaseModel] | None:
+    """Return the block of keys behind an annotation: itself, per side, per name, or absent."""
+    if get_origin(annotation) is tuple:
+        return None
+    for candidate in (annotation, *get_args(annotation)):
+        if is_model(candidate):
+            inner = side_type(candidate) if issubclass(candidate, Sides) else candidate
+            if is_model(inner):
+                return inner
+    return None
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
