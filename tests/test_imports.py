@@ -39,7 +39,7 @@ APART = ({"ocp", "inverse"},)
 
 CONFINED = {
     "casadi": ("model", "ocp", "commands.doctor"),
-    "pinocchio": ("model", "ocp", "inverse", "output.figures.stick_figures"),
+    "pinocchio": ("model", "ocp", "inverse", "output.body"),
     "matplotlib": (
         "output.figures",
         "output.recorded_figures",

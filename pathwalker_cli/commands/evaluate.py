@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,20 +54,12 @@ def evaluate_command(
 
 def _gaits(runs: Sequence[Path]) -> list[Gait]:
     """Return the gaits of the runs under names that differ."""
-    from pathwalker_cli.errors import DataError
-    from pathwalker_cli.evaluation.run import gait_of_run
+    from pathwalker_cli.evaluation.run import gait_of_run, run_names
 
-    places = [folder.resolve() for folder in runs]
-    for place, folder in zip(places, runs, strict=True):
-        if places.count(place) > 1:
-            raise DataError("is named twice", where=str(folder), allowed="each run once")
-    gaits: list[Gait] = []
-    for folder in runs:
-        gait = gait_of_run(folder)
-        known = {each.name for each in gaits}
-        names = (gait.name if n == 1 else f"{gait.name}-{n}" for n in count(1))
-        gaits.append(replace(gait, name=next(name for name in names if name not in known)))
-    return gaits
+    names = run_names(runs)
+    return [
+        replace(gait_of_run(folder), name=name) for folder, name in zip(runs, names, strict=True)
+    ]
 
 
 def _trials(gaits: Sequence[Gait], trial: str | None) -> list[str | None]:

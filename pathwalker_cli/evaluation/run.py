@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +15,29 @@ from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.series import GaitSeries, gait_series
 from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.run_folder import load_run
+from pathwalker_cli.output.run_folder import Run, load_run
 
-__all__ = ["gait_of_run", "gait_of_series"]
+__all__ = ["gait_of_run", "gait_of_series", "run_names", "run_notes", "stride_of_run"]
 
 
-def gait_of_run(folder: str | Path) -> Gait:
-    """Return the gait of a converged run.
+def run_names(folders: Sequence[Path]) -> tuple[str, ...]:
+    """Return names of runs that differ: those of their folders, numbered where they are alike.
+
+    Raises:
+        DataError: If a folder is named twice.
+    """
+    places = [folder.resolve() for folder in folders]
+    names: list[str] = []
+    for place, folder in zip(places, folders, strict=True):
+        if places.count(place) > 1:
+            raise DataError("is named twice", where=str(folder), allowed="each run once")
+        candidates = (place.name if n == 1 else f"{place.name}-{n}" for n in count(1))
+        names.append(next(name for name in candidates if name not in names))
+    return tuple(names)
+
+
+def stride_of_run(folder: str | Path) -> tuple[Run, GaitSeries]:
+    """Return a converged run and its stride.
 
     Args:
         folder: The folder that `pathwalker solve` wrote.
@@ -44,10 +62,27 @@ def gait_of_run(folder: str | Path) -> Gait:
     config = run.config
     patient = study_patient(config)
     walker = build_walker(patient, config.condition, config.model.published)
-    notes = ("a quick check on a coarse mesh: for orientation only",) if config.smoke else ()
-    series = gait_series(walker, run.motion)
+    return run, gait_series(walker, run.motion)
+
+
+def run_notes(run: Run) -> tuple[str, ...]:
+    """Return what to know about a run, one sentence each."""
+    return ("a quick check on a coarse mesh: for orientation only",) if run.config.smoke else ()
+
+
+def gait_of_run(folder: str | Path) -> Gait:
+    """Return the gait of a converged run.
+
+    Args:
+        folder: The folder that `pathwalker solve` wrote.
+
+    Raises:
+        DataError: If it is no run folder, did not converge or holds no full stride.
+        PatientError: If the patient is no longer there.
+    """
+    run, series = stride_of_run(folder)
     name = Path(folder).resolve().name
-    return gait_of_series(series, name, config.problem, run.metrics["effort"], notes)
+    return gait_of_series(series, name, run.config.problem, run.metrics["effort"], run_notes(run))
 
 
 def gait_of_series(

@@ -5,19 +5,21 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from pathwalker_cli.conventions import SUFFIX, Side
-from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.series import GaitSeries
+from pathwalker_cli.output.body import body_points
 from pathwalker_cli.output.cycle import BOTH_SIDES, foot_strike_time
 from pathwalker_cli.output.feet import centre_of_pressure, loaded
 from pathwalker_cli.output.figures.curves import Reference
 from pathwalker_cli.output.figures.style import (
+    BODY_COLOUR,
+    FORCE_COLOUR,
+    FORCE_LENGTH,
     NEUTRAL,
     PAGE,
     dress,
@@ -25,40 +27,16 @@ from pathwalker_cli.output.figures.style import (
     new_figure,
 )
 
-__all__ = ["body_points", "stick_figures"]
+__all__ = ["stick_figures"]
 
 _ROWS: Final = ((0, 10, 20, 30, 40), (50, 60, 70, 80, 90))
 """Positions in the right gait cycle [%] of the figures in each row."""
 _SPACING: Final = 1.05
 """Distance from figure to figure, as a share of the pelvis height."""
-_FORCE_LENGTH: Final = 0.6
-"""Length of an arrow of one body weight, as a share of the pelvis height."""
-_DARK: Final = "#222222"
-_LIGHT: Final = "#8a8a8a"
-_FORCE: Final = "#009E73"
 _LEG_LOOK: Final[dict[Side, dict[str, Any]]] = {
-    "right": {"color": _DARK, "linestyle": "-", "linewidth": 1.8, "zorder": 3},
-    "left": {"color": _LIGHT, "linestyle": "--", "linewidth": 1.5, "zorder": 2},
+    "right": {"color": BODY_COLOUR["right"], "linestyle": "-", "linewidth": 1.8, "zorder": 3},
+    "left": {"color": BODY_COLOUR["left"], "linestyle": "--", "linewidth": 1.5, "zorder": 2},
 }
-
-
-def body_points(walker: Walker, q: np.ndarray) -> dict[str, np.ndarray]:
-    """Return positions of joints, heels, toes, neck and head (x, z) [m].
-
-    Args:
-        walker: Who walks.
-        q: Generalised coordinates, shape (10,).
-    """
-    data = walker.model.createData()
-    pin.framesForwardKinematics(walker.model, data, np.asarray(q, dtype=float))
-    legs = [f"{name}_{s}" for name in ("hip", "knee", "ankle", "heel", "toe") for s in "rl"]
-    points = {
-        name: data.oMf[walker.model.getFrameId(name)].translation[[0, 2]].copy()
-        for name in (*legs, "lumbar", "head")
-    }
-    points["neck"] = points.pop("head")
-    points["head"] = points["neck"] + 0.25 * (points["neck"] - points["lumbar"])
-    return points
 
 
 def stick_figures(series: GaitSeries, reference: Reference | None = None) -> Figure:
@@ -78,7 +56,7 @@ def stick_figures(series: GaitSeries, reference: Reference | None = None) -> Fig
             Line2D(
                 [],
                 [],
-                color=_FORCE,
+                color=FORCE_COLOUR,
                 linewidth=1.4,
                 label="ground force, 1 body weight as long as 0.6 pelvis heights",
             ),
@@ -111,7 +89,7 @@ def _draw_instant(ax: Axes, series: GaitSeries, percent: float, slot: float, hei
     shift = np.array([slot - q[0], 0.0])
     _draw_body(ax, {n: p + shift for n, p in body_points(series.walker, q).items()})
     row = int(np.argmin(np.abs(series.time - time)))
-    scale = _FORCE_LENGTH * height / series.walker.weight
+    scale = FORCE_LENGTH * height / series.walker.weight
     for side in BOTH_SIDES:
         if loaded(series, side)[row]:
             x = centre_of_pressure(series, side)[row] - series.q[row, 0] + slot
@@ -126,10 +104,12 @@ def _draw_body(ax: Axes, points: dict[str, np.ndarray]) -> None:
         _draw_chain(ax, points, ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}"), look)
         foot = (f"ankle_{s}", f"heel_{s}", f"toe_{s}", f"ankle_{s}")
         _draw_chain(ax, points, foot, look | {"linewidth": 1.0})
-    trunk = {"color": _DARK, "linewidth": 2.2, "zorder": 4}
+    trunk = {"color": BODY_COLOUR["right"], "linewidth": 2.2, "zorder": 4}
     _draw_chain(ax, points, ("lumbar", "neck"), trunk)
     radius = float(np.linalg.norm(points["head"] - points["neck"]))
-    ax.add_patch(Circle(tuple(points["head"]), radius, fill=False, color=_DARK, linewidth=1.2))
+    ax.add_patch(
+        Circle(tuple(points["head"]), radius, fill=False, color=BODY_COLOUR["right"], linewidth=1.2)
+    )
 
 
 def _draw_chain(
@@ -147,7 +127,7 @@ def _draw_force(ax: Axes, x: float, arrow: np.ndarray) -> None:
         [0.0],
         [arrow[0]],
         [arrow[1]],
-        color=_FORCE,
+        color=FORCE_COLOUR,
         angles="xy",
         scale_units="xy",
         scale=1.0,

@@ -15,6 +15,9 @@ from pathwalker_cli.conventions import Side
 from pathwalker_cli.output.cycle import BOTH_SIDES, OwnCycle
 
 __all__ = [
+    "BODY_COLOUR",
+    "FORCE_COLOUR",
+    "FORCE_LENGTH",
     "LINE_COLOUR",
     "LINE_STYLE",
     "MARKER",
@@ -43,6 +46,12 @@ LINE_STYLE: Final[dict[Side, Literal["-", "--"]]] = {"right": "-", "left": "--"}
 """Right solid, left dashed: sides differ without colour too."""
 MARKER: Final[dict[Side, Literal["o", "s"]]] = {"right": "o", "left": "s"}
 """Right round, left square, for the same reason."""
+BODY_COLOUR: Final[dict[Side, str]] = {"right": "#222222", "left": "#8a8a8a"}
+"""Legs of a drawn walker; trunk and head are as dark as the right leg."""
+FORCE_COLOUR: Final = "#009E73"
+"""Ground reaction forces that are drawn as arrows."""
+FORCE_LENGTH: Final = 0.6
+"""Length of an arrow of one body weight, as a share of the pelvis height."""
 NEUTRAL: Final = "#555555"
 """Grey of everything that belongs to no side."""
 
