@@ -43,6 +43,8 @@ CONFINED = {
     "matplotlib": (
         "output.figures",
         "output.recorded_figures",
+        "evaluation.ankle_panels",
+        "evaluation.cycle_curves",
         "evaluation.figures",
         "reproduce.figures",
         "reproduce.muscle_figures",

@@ -15,6 +15,7 @@ from pathwalker_cli.conventions import Side
 from pathwalker_cli.output.cycle import BOTH_SIDES, OwnCycle
 
 __all__ = [
+    "COLUMN",
     "LINE_COLOUR",
     "LINE_STYLE",
     "MARKER",
@@ -36,6 +37,8 @@ __all__ = [
 
 PAGE: Final = 7.0
 """Width of a printed page [in]."""
+COLUMN: Final = 3.35
+"""Width of a printed column [in]: 85 mm."""
 
 LINE_COLOUR: Final[dict[Side, str]] = {"right": "#0072B2", "left": "#D55E00"}
 """Blue and vermilion of the palette by Okabe and Ito, told apart with any colour vision."""
@@ -120,13 +123,13 @@ def band_handle() -> Artist:
     return Patch(facecolor="#bbbbbb", alpha=0.6, label="recorded: range, thin line: mean")
 
 
-def legend(fig: Figure, handles: Iterable[Artist]) -> None:
-    """Put one legend in a row above all axes."""
+def legend(fig: Figure, handles: Iterable[Artist], columns: int = 0) -> None:
+    """Put one legend above all axes, in a row unless a number of columns is given."""
     entries = list(handles)
     fig.legend(
         handles=entries,
         loc="outside upper center",
-        ncols=len(entries),
+        ncols=columns or len(entries),
         frameon=False,
         handlelength=2.6,
     )
