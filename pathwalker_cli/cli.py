@@ -45,6 +45,11 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "evaluate_command",
         "Compare predicted gait with the recordings of the patient.",
     ),
+    "report": (
+        "pathwalker_cli.commands.report",
+        "report_command",
+        "Write one HTML page about runs, recorded gait or a cohort.",
+    ),
     "reproduce": (
         "pathwalker_cli.commands.reproduce",
         "reproduce_command",

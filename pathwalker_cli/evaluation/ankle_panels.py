@@ -34,8 +34,7 @@ def draw_ankle(ax: Axes, shown: Sequence[Trace], side: Side) -> None:
     zero_line(ax)
     for trace in shown:
         _draw_recorded(ax, trace, side)
-    if len(shown) > 1:  # room for the slopes above the curves
-        ax.margins(y=0.08 * (1 + len(shown)))
+    ax.margins(y=0.08 * (1 + len(shown)))  # room for the slopes above the curves
     for i, trace in enumerate(shown):
         slope, alone = _draw_profile(ax, trace, side), trace.order is None
         text = f"mean slope {slope:.0f} N m/rad{_recorded_slopes(trace, side)}"

@@ -26,7 +26,7 @@ from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.traces import Trace
 from pathwalker_cli.inverse.bands import POINTS
 from pathwalker_cli.output.figures.curves import CLINICAL_ANGLE, EXTENSION, Band
-from pathwalker_cli.output.figures.style import SMALL, dress, percent_axis, zero_line
+from pathwalker_cli.output.figures.style import dress, percent_axis, small_labels, zero_line
 
 __all__ = [
     "ACTIVATIONS",
@@ -106,8 +106,7 @@ def dress_cycle(ax: Axes, curve: CycleCurve, side: Side, label: bool) -> None:
     """Give a low panel its title and, if wanted, the label of its y axis in two lines."""
     dress(ax, curve.title(side), y=curve.label.replace(" [", "\n[") if label else "")
     ax.set_xlabel(f"{side} gait cycle [%]")
-    for label_of in (ax.title, ax.xaxis.label, ax.yaxis.label):
-        label_of.set_fontsize(SMALL)
+    small_labels(ax)
     ax.locator_params(axis="y", nbins=4)
 
 
@@ -191,7 +190,7 @@ def _activation(joint: str, up: str, down: str) -> CycleCurve:
         found = gait.over_cycle(gait.activation[:, columns], side, FINE.size)
         return found[:, 0], -found[:, 1]
 
-    name, ways = ("trunk", "extend +, bend -") if midline else (joint, "extend +, flex -")
+    name, ways = ("trunk", "ext. +, bend -") if midline else (joint, "ext. +, flex. -")
     return CycleCurve(
         f"activation_{joint}", f"{name} muscles", f"{ways} [1]", lines, midline=midline
     )

@@ -36,6 +36,7 @@ from pathwalker_cli.output.figures.style import (
     legend,
     new_figure,
     percent_axis,
+    small_labels,
 )
 
 __all__ = [
@@ -49,9 +50,9 @@ __all__ = [
     "save_overlays",
 ]
 
-PAIR_HEIGHT: Final = 1.18
+PAIR_HEIGHT: Final = 1.15
 """Height of a row of two panels in a column [in]."""
-ANKLE_HEIGHT: Final = 1.7
+ANKLE_HEIGHT: Final = 2.0 * PAIR_HEIGHT
 """The same of torque over angle, whose slopes shall be seen [in]."""
 
 
@@ -132,7 +133,9 @@ def ankle_pair(shown: Sequence[Trace], head: float = 0.0) -> Figure:
         head: Height to keep for a legend [in].
     """
     fig = new_figure(COLUMN, head + ANKLE_HEIGHT)
-    _draw_ankles(fig.subplots(1, 2, sharex=True, sharey=True), shown, "net torque")
+    _draw_ankles(fig.subplots(1, 2, sharex=True, sharey=True), shown, "net plantarflexing torque")
+    for ax in fig.axes:
+        small_labels(ax)
     return fig
 
 

@@ -34,7 +34,7 @@ _DIGITS: Final = {
     "s/m": 3,
     "1/min": 1,
 }
-"""Digits after the point by unit; angles as degrees."""
+"""Digits after the point by unit; angles as degrees, shares of the stride in per cent."""
 
 _SHOWN_UNIT: Final = {"rad": "deg", "body weights": "BW", "1": ""}
 """Units that the terminal shows in another way."""
@@ -136,7 +136,15 @@ def number_text(value: float | None, quantity: Quantity, sign: bool = False) -> 
     if value is None:
         return "-"
     shown = float(to_degrees(value)) if quantity.unit == "rad" else value
-    return f"{shown:{'+' if sign else ''}.{_DIGITS[quantity.unit]}f}"
+    digits = _DIGITS[quantity.unit]
+    if _is_share(quantity):
+        shown, digits = 100.0 * value, 1
+    return f"{shown:{'+' if sign else ''}.{digits}f}"
+
+
+def _is_share(quantity: Quantity) -> bool:
+    """Return whether people read a quantity in per cent of the stride."""
+    return "_share" in quantity.key
 
 
 def spread_text(found: Spread | None, quantity: Quantity) -> str:
@@ -149,4 +157,4 @@ def spread_text(found: Spread | None, quantity: Quantity) -> str:
 
 def unit_text(quantity: Quantity) -> str:
     """Return the unit as people read it."""
-    return _SHOWN_UNIT.get(quantity.unit, quantity.unit)
+    return "%" if _is_share(quantity) else _SHOWN_UNIT.get(quantity.unit, quantity.unit)

@@ -15,7 +15,7 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output.metrics import gait_metrics
-from pathwalker_cli.output.versions import versions
+from pathwalker_cli.output.versions import today, versions
 from pathwalker_cli.patient import Patient
 
 __all__ = ["RUN_FORMAT", "RunInputs", "run_inputs", "run_metrics", "sha256", "stiffness_ranges"]
@@ -132,6 +132,7 @@ def _origin(solution: GaitSolution, config: StudyConfig, inputs: RunInputs) -> d
         "warm_start": inputs.warm_start or None,
         "dynamics_backend": solution.walker.backend,
         "published_model": config.model.published,
+        "date": today(),
         "versions": versions(),
         "input_hashes": inputs.hashes,
     }

@@ -31,6 +31,7 @@ __all__ = [
     "new_figure",
     "percent_axis",
     "side_handles",
+    "small_labels",
     "toe_off_line",
     "zero_line",
 ]
@@ -86,6 +87,12 @@ def dress(ax: Axes, title: str = "", x: str = "", y: str = "") -> None:
     ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
     ax.grid(visible=True, linewidth=0.4, color="#dddddd")
     ax.set_axisbelow(True)
+
+
+def small_labels(ax: Axes) -> None:
+    """Let title and labels be as small as the ticks, for panels that share a column."""
+    for text in (ax.title, ax.xaxis.label, ax.yaxis.label):
+        text.set_fontsize(SMALL)
 
 
 def percent_axis(ax: Axes, label: bool = True) -> None:
