@@ -55,6 +55,11 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "rerun_command",
         "Solve a run again from its folder alone and tell how the two differ.",
     ),
+    "report": (
+        "pathwalker_cli.commands.report",
+        "report_command",
+        "Write one HTML page about runs, recorded gait or a cohort.",
+    ),
     "reproduce": (
         "pathwalker_cli.commands.reproduce",
         "reproduce_command",

@@ -28,7 +28,7 @@ LAYERS = (
     {"output"},
     {"evaluation", "verification"},
     {"studies"},
-    {"reproduce"},
+    {"reproduce", "report"},
     {"commands"},
     {"cli"},
 )
@@ -40,10 +40,14 @@ APART = ({"ocp", "inverse"},)
 CONFINED = {
     "casadi": ("model", "ocp", "commands.doctor"),
     "pinocchio": ("model", "ocp", "inverse", "output.body"),
+    "jinja2": ("report.html",),
     "matplotlib": (
         "output.figures",
         "output.recorded_figures",
+        "evaluation.ankle_panels",
+        "evaluation.cycle_curves",
         "evaluation.figures",
+        "report.figures",
         "reproduce.figures",
         "reproduce.muscle_figures",
         "studies.landscape.figures",

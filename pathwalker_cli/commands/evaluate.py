@@ -100,6 +100,7 @@ def _write(out: Path, evaluations: Sequence[Evaluation], content: dict[str, Any]
     """Write tables and figures, all or none."""
     from pathwalker_cli.evaluation.figures import save_evaluation_figures
     from pathwalker_cli.evaluation.files import write_csv
+    from pathwalker_cli.evaluation.traces import lone_trace
     from pathwalker_cli.io.json_file import write_json
     from pathwalker_cli.output.recorded_files import staged_folder
 
@@ -109,7 +110,8 @@ def _write(out: Path, evaluations: Sequence[Evaluation], content: dict[str, Any]
         for each in evaluations:
             figures = folder / "figures"
             save_evaluation_figures(
-                each, figures / each.gait.name if len(evaluations) > 1 else figures
+                lone_trace(each.gait, each.recorded),
+                figures / each.gait.name if len(evaluations) > 1 else figures,
             )
 
 

@@ -96,13 +96,14 @@ def id_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: b
         strength_table,
         study_warnings,
     )
-    from pathwalker_cli.output.recorded_study import write_dynamics
+    from pathwalker_cli.output.recorded_study import write_dynamics, write_origin
     from pathwalker_cli.output.recorded_text import residuals_renderable, strengths_renderable
 
     def write(folder: Path, trials: Sequence[StudyTrial], patient: Patient) -> _Findings:
         tables = residual_tables(trials, patient, study)
         strengths = strength_table(trials, patient, study)
         write_dynamics(folder, trials, tables, strengths, patient.body_mass, study.method)
+        write_origin(folder, patient, study.method)
         warnings = study_warnings(trials, tables, patient, study.largest_residual)
         return _Findings(warnings, (residuals_renderable(tables), strengths_renderable(strengths)))
 

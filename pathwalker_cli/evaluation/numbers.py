@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,9 +11,10 @@ from pathwalker_cli.evaluation.ankle import ankle_line, ankle_profile, recorded_
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.spread import Spread, spread
-from pathwalker_cli.inverse.cycles import step_lengths, walking_speed
+from pathwalker_cli.inverse.cycles import GaitCycle, step_lengths, walking_speed
 from pathwalker_cli.inverse.filters import frame_rate
 from pathwalker_cli.inverse.forces import foot_extents
+from pathwalker_cli.io.c3d import Event
 from pathwalker_cli.output.cycle import BOTH_SIDES
 
 __all__ = ["gait_numbers", "recorded_numbers"]
@@ -21,14 +22,15 @@ __all__ = ["gait_numbers", "recorded_numbers"]
 
 def gait_numbers(gait: Gait) -> dict[str, float]:
     """Return what the gait says by itself, by key of `quantities.QUANTITIES`, SI units."""
-    found = {"walking_speed": gait.walking_speed, "stride_time": gait.duration}
+    found = {"walking_speed": gait.walking_speed}
+    stances = {side: gait.toe_off(side) - gait.strike(side) for side in BOTH_SIDES}
+    found |= _timing(gait.duration, stances)
+    found |= _double(gait.duration, sum(stances.values()) - gait.duration)
     if gait.effort is not None:
         found["effort_per_distance"] = gait.effort / (gait.walking_speed * gait.duration)
     for side in BOTH_SIDES:
         knee = gait.column(f"knee_{SUFFIX[side]}")[gait.stance_rows(side)]
-        stance = gait.toe_off(side) - gait.strike(side)
         found[f"step_length_{side}"] = gait.step_length(side)
-        found[f"stance_share_{side}"] = stance / gait.duration
         found[f"min_stance_knee_flexion_{side}"] = float(knee.min())
         found |= _loads(gait, side) | _muscles(gait, side) | _stiffness(gait, side)
     return found
@@ -41,22 +43,13 @@ def recorded_numbers(recorded: RecordedGait) -> dict[str, Spread]:
     stances, forces and torques of measured ones only.
     """
     speeds = [walking_speed(trial.motion) for trial in recorded.trials]
-    strides = [
-        (cycle.end - cycle.start) / frame_rate(trial.motion)
-        for side in BOTH_SIDES
-        for trial, cycle in recorded.cycles(side)
-    ]
-    values: dict[str, Sequence[float]] = {"walking_speed": speeds, "stride_time": strides}
+    values: dict[str, Sequence[float]] = {"walking_speed": speeds, **_recorded_timing(recorded)}
     steps = _steps(recorded)
     for side in BOTH_SIDES:
         profiles = recorded_ankle_profiles(recorded, side)
         up = recorded.stance_forces(side)[:, :, 1:].max(axis=(1, 2), initial=-np.inf)
         values |= {
             f"step_length_{side}": steps[side],
-            f"stance_share_{side}": [
-                (cycle.toe_off - cycle.start) / (cycle.end - cycle.start)
-                for _, cycle in recorded.cycles(side)
-            ],
             f"min_stance_knee_flexion_{side}": _least_knees(recorded, side),
             f"peak_vertical_force_{side}": (up / recorded.walker.weight).tolist(),
             f"ankle_torque_slope_stance_{side}": [ankle_line(profile)[0] for profile in profiles],
@@ -64,6 +57,58 @@ def recorded_numbers(recorded: RecordedGait) -> dict[str, Spread]:
         }
     spreads = {key: spread(found) for key, found in values.items()}
     return {key: found for key, found in spreads.items() if found is not None}
+
+
+def _timing(stride: float, stances: Mapping[Side, float]) -> dict[str, float]:
+    """Return times and shares of a stride.
+
+    Args:
+        stride: Its time [s].
+        stances: Time of the stance of each side [s].
+    """
+    found = {"stride_time": stride, "cadence": 120.0 / stride}
+    for side, stance in stances.items():
+        swing = stride - stance
+        found |= {f"stance_share_{side}": stance / stride, f"stance_time_{side}": stance}
+        found |= {f"swing_share_{side}": swing / stride, f"swing_time_{side}": swing}
+    return found
+
+
+def _double(stride: float, time: float) -> dict[str, float]:
+    """Return time and share of double support in a stride [s]."""
+    return {"double_support_time": time, "double_support_share": time / stride}
+
+
+def _recorded_timing(recorded: RecordedGait) -> dict[str, list[float]]:
+    """Return the times of every recorded stride, and its shares of stance and double support."""
+    found: dict[str, list[float]] = {}
+    for side in BOTH_SIDES:
+        for trial, cycle in recorded.cycles(side):
+            rate = frame_rate(trial.motion)
+            stride = (cycle.end - cycle.start) / rate
+            stance = (cycle.toe_off - cycle.start) / rate
+            values = _timing(stride, {side: stance})
+            both = _double_support(trial.events, cycle)
+            if both is not None:
+                values |= _double(stride, both / rate)
+            for key, value in values.items():
+                found.setdefault(key, []).append(value)
+    return found
+
+
+def _double_support(events: Sequence[Event], cycle: GaitCycle) -> int | None:
+    """Return the frames of a gait cycle with both feet on the ground, None if events are missing.
+
+    Within the stance of the side, the other foot leaves the ground and comes back to it.
+    """
+    other = {
+        e.kind: e.frame
+        for e in events
+        if e.side != cycle.side and cycle.start < e.frame < cycle.toe_off
+    }
+    if other.keys() != {"toe_off", "foot_strike"}:
+        return None
+    return (other["toe_off"] - cycle.start) + (cycle.toe_off - other["foot_strike"])
 
 
 def _loads(gait: Gait, side: Side) -> dict[str, float]:

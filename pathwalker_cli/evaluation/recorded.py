@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from pathwalker_cli.conventions import SUFFIX, Side
-from pathwalker_cli.inverse.bands import resampled
+from pathwalker_cli.inverse.bands import POINTS, resampled
 from pathwalker_cli.inverse.cycles import GaitCycle, Stance, stances
 from pathwalker_cli.inverse.evaluate import StudyTrial, recorded_trials
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
@@ -56,13 +56,36 @@ class RecordedGait:
 
     def cycle_forces(self, side: Side) -> np.ndarray:
         """Return (forward, up) over every cycle with a measured stance [N], (cycles, POINTS, 2)."""
-        found = []
-        for trial, cycle in self.cycles(side):
-            if trial.forces is not None:
-                curve = _forces(trial, side)[cycle.start : cycle.end + 1]
-                # At the next strike the foot is still in the air; what follows may not be measured.
-                found.append(resampled(np.vstack([curve[:-1], curve[-2:-1]])))
-        return _stacked(found)
+        return _stacked(
+            _over_cycle(_forces(trial, side), cycle)
+            for trial, cycle in self.cycles(side)
+            if trial.forces is not None
+        )
+
+    def cycle_moments(self, side: Side, coordinate: str) -> np.ndarray:
+        """Return a net joint moment over every cycle with a measured stance [N m].
+
+        Args:
+            side: Side of the cycles.
+            coordinate: Coordinate that the moment drives, e.g. "hip_r".
+
+        Returns:
+            Shape (cycles, POINTS).
+        """
+        found = _stacked(
+            _over_cycle(trial.tau[coordinate][:, None], cycle)
+            for trial, cycle in self.cycles(side)
+            if trial.tau is not None
+        )
+        return found.reshape(-1, POINTS)
+
+    def cycle_angles(self, side: Side, coordinate: str) -> np.ndarray:
+        """Return a coordinate over every complete cycle [rad], shape (cycles, POINTS)."""
+        found = [
+            resampled(trial.motion[coordinate][cycle.start : cycle.end + 1, None])
+            for trial, cycle in self.cycles(side)
+        ]
+        return np.array(found).reshape(-1, POINTS)
 
 
 def recorded_gait(walker: Walker) -> RecordedGait | None:
@@ -94,7 +117,14 @@ def _forces(trial: StudyTrial, side: Side) -> np.ndarray:
     return np.stack([trial.forces[f"force_{SUFFIX[side]}_{axis}"] for axis in "xz"], axis=1)
 
 
-def _stacked(curves: list[np.ndarray]) -> np.ndarray:
-    """Return those curves that are known throughout, shape (curves, POINTS, 2)."""
+def _over_cycle(values: np.ndarray, cycle: GaitCycle) -> np.ndarray:
+    """Return columns that only measured stances have over a cycle, shape (POINTS, m)."""
+    curve = values[cycle.start : cycle.end + 1]
+    # At the next strike the foot is still in the air; what follows may not be measured.
+    return resampled(np.vstack([curve[:-1], curve[-2:-1]]))
+
+
+def _stacked(curves: Iterable[np.ndarray]) -> np.ndarray:
+    """Return those curves that are known throughout, shape (curves, POINTS, m)."""
     known = [curve for curve in curves if np.isfinite(curve).all()]
     return np.array(known) if known else np.empty((0, 0, 2))

@@ -12,7 +12,14 @@ from pathwalker_cli.evaluation.paper import PATIENT
 from pathwalker_cli.evaluation.quantities import Quantity
 from pathwalker_cli.evaluation.spread import Spread
 
-__all__ = ["change_lines", "evaluation_lines", "evaluation_notes"]
+__all__ = [
+    "change_lines",
+    "evaluation_lines",
+    "evaluation_notes",
+    "number_text",
+    "spread_text",
+    "unit_text",
+]
 
 _DIGITS: Final = {
     "m/s": 3,
@@ -25,8 +32,9 @@ _DIGITS: Final = {
     "N m": 1,
     "N m/rad": 1,
     "s/m": 3,
+    "1/min": 1,
 }
-"""Digits after the point by unit; angles as degrees."""
+"""Digits after the point by unit; angles as degrees, shares of the stride in per cent."""
 
 _SHOWN_UNIT: Final = {"rad": "deg", "body weights": "BW", "1": ""}
 """Units that the terminal shows in another way."""
@@ -47,11 +55,11 @@ def evaluation_lines(evaluation: Evaluation) -> Iterator[str]:
         for row in rows:
             yield _line(
                 row.quantity.label,
-                _number(row.value, row.quantity),
-                _spread(row.recorded, row.quantity),
+                number_text(row.value, row.quantity),
+                spread_text(row.recorded, row.quantity),
                 row.position or "",
                 str(row.paper or ""),
-                _unit(row.quantity),
+                unit_text(row.quantity),
             )
 
 
@@ -66,13 +74,13 @@ def change_lines(changes: Sequence[Change]) -> Iterator[str]:
             quantity = row.quantity
             yield _change_line(
                 quantity.label,
-                _number(row.barefoot, quantity),
-                _number(row.orthosis, quantity),
-                _number(row.value, quantity, sign=True),
+                number_text(row.barefoot, quantity),
+                number_text(row.orthosis, quantity),
+                number_text(row.value, quantity, sign=True),
                 f"{100.0 * row.value / row.barefoot:+.0f}" if row.barefoot else "",
-                _number(row.recorded, quantity, sign=True),
+                number_text(row.recorded, quantity, sign=True),
                 str(row.paper or ""),
-                _unit(quantity),
+                unit_text(quantity),
             )
 
 
@@ -123,22 +131,30 @@ def _change_line(
     return f" {label:<22}{ours}{recorded:>9}{paper:>7}  {unit}".rstrip()
 
 
-def _number(value: float | None, quantity: Quantity, sign: bool = False) -> str:
-    """Return a value as the terminal shows it, "-" for none."""
+def number_text(value: float | None, quantity: Quantity, sign: bool = False) -> str:
+    """Return a value as people read it, "-" for none."""
     if value is None:
         return "-"
     shown = float(to_degrees(value)) if quantity.unit == "rad" else value
-    return f"{shown:{'+' if sign else ''}.{_DIGITS[quantity.unit]}f}"
+    digits = _DIGITS[quantity.unit]
+    if _is_share(quantity):
+        shown, digits = 100.0 * value, 1
+    return f"{shown:{'+' if sign else ''}.{digits}f}"
 
 
-def _spread(found: Spread | None, quantity: Quantity) -> str:
+def _is_share(quantity: Quantity) -> bool:
+    """Return whether people read a quantity in per cent of the stride."""
+    return "_share" in quantity.key
+
+
+def spread_text(found: Spread | None, quantity: Quantity) -> str:
     """Return "mean [min, max]", "-" for none."""
     if found is None:
         return "-"
-    mean, low, high = (_number(x, quantity) for x in (found.mean, found.low, found.high))
+    mean, low, high = (number_text(x, quantity) for x in (found.mean, found.low, found.high))
     return f"{mean} [{low}, {high}]"
 
 
-def _unit(quantity: Quantity) -> str:
-    """Return the unit as the terminal shows it."""
-    return _SHOWN_UNIT.get(quantity.unit, quantity.unit)
+def unit_text(quantity: Quantity) -> str:
+    """Return the unit as people read it."""
+    return "%" if _is_share(quantity) else _SHOWN_UNIT.get(quantity.unit, quantity.unit)

@@ -9,7 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, Literal
 
-__all__ = ["atomic_open", "atomic_path"]
+from pathwalker_cli.errors import DataError
+
+__all__ = ["atomic_open", "atomic_path", "check_file", "write_text"]
 
 
 @contextmanager
@@ -41,3 +43,32 @@ def atomic_open(path: str | Path, mode: Literal["w", "wb"] = "w") -> Iterator[IO
     text = {"encoding": "utf-8", "newline": ""} if mode == "w" else {}
     with atomic_path(path) as temporary, temporary.open(mode, **text) as file:  # type: ignore[call-overload]
         yield file
+
+
+def check_file(path: Path) -> None:
+    """Refuse a place at which no file can be written.
+
+    Raises:
+        DataError: If it is a folder, or would be in none.
+    """
+    if path.is_dir():
+        raise DataError("is a folder", where=str(path), mend="name a file in it")
+    if not path.absolute().parent.is_dir():
+        raise DataError("no such folder", where=str(path.parent), mend="make it first")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file that a user asked for in one stroke.
+
+    Raises:
+        DataError: If it cannot be written.
+    """
+    check_file(path)
+    try:
+        with atomic_open(path) as file:
+            file.write(text)
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise DataError(
+            f"cannot be written: {reason}", where=str(path), mend="choose another file"
+        ) from None

@@ -18,6 +18,8 @@ from pathwalker_cli.trajectory import Trajectory
 __all__ = [
     "FORCE_COLUMNS",
     "CompactRecording",
+    "names_in",
+    "read_compact",
     "read_recording",
     "recording_names",
     "write_recording",
@@ -73,7 +75,11 @@ def write_recording(folder: str | Path, recording: CompactRecording) -> None:
 
 def recording_names(patient: Patient, condition: Condition) -> tuple[str, ...]:
     """Return the names of the trials that stand beside a patient's file."""
-    folder = _folder(patient, condition)
+    return names_in(_folder(patient, condition))
+
+
+def names_in(folder: Path) -> tuple[str, ...]:
+    """Return the names of the trials in a folder."""
     return tuple(sorted(p.name.removesuffix("_angles.csv") for p in folder.glob("*_angles.csv")))
 
 
@@ -90,7 +96,16 @@ def read_recording(patient: Patient, condition: Condition, name: str) -> Compact
             allowed=", ".join(names) or "none are there",
             mend="import C3D files first",
         )
-    stem = _folder(patient, condition) / name
+    return read_compact(_folder(patient, condition), name)
+
+
+def read_compact(folder: Path, name: str) -> CompactRecording:
+    """Read one trial that stands in a folder.
+
+    Raises:
+        DataError: If a file of it cannot be used.
+    """
+    stem = folder / name
     motion = _read_table(Path(f"{stem}_angles.csv"), _ANGLE_COLUMNS)
     frames = motion.time.size
     if frames < LEAST_FRAMES:

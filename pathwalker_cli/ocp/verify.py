@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Final
 
 import casadi as ca
 import numpy as np
@@ -33,6 +35,11 @@ _NEAR = 1e-2
 """Distance in solver units beyond which a bound is never called active."""
 _PULL = 1e-5
 """Least multiplier of an active bound: without it the bound does not matter."""
+
+
+_ACTIVE_BOUND: Final = re.compile(
+    r"(?P<name>.+) (?P<side>lower|upper) (?P<value>[-+.\w]+)(?: in (?P<places>.+))?"
+)
 
 
 @dataclass(frozen=True)
@@ -84,6 +91,20 @@ class ActiveBound:
         """Return e.g. "knee_r lower 0.42 in left_flat, left_toe"."""
         where = f" in {', '.join(self.places)}" if self.places else ""
         return f"{self.name} {self.side} {self.value:.4g}{where}"
+
+    @classmethod
+    def parse(cls, text: str) -> ActiveBound:
+        """Return the bound of such a text.
+
+        Raises:
+            ValueError: If it is none.
+        """
+        match = _ACTIVE_BOUND.fullmatch(text)
+        if match is None:
+            raise ValueError(f"'{text}' is no active bound")
+        places = match["places"]
+        return cls(match["name"], match["side"], float(match["value"]),
+                   tuple(places.split(", ")) if places else ())  # fmt: skip
 
 
 def active_bounds(program: CollocationProgram, result: NlpResult) -> tuple[ActiveBound, ...]:

@@ -44,6 +44,7 @@ __all__ = [
     "joint_angle_figure",
     "joint_torque_figure",
     "marker_figure",
+    "name_figure",
     "save_recorded_figures",
 ]
 
@@ -189,7 +190,7 @@ def save_recorded_figures(
     with mpl.rc_context(STYLE):
         for name, maker in makers.items():
             figure = maker()
-            _head(figure, _counted(f"{trials[0].condition},", len(trials), "trial"))
+            name_figure(figure, _counted(f"{trials[0].condition},", len(trials), "trial"))
             for extension in formats:
                 names.append(f"{name}.{extension}")
                 metadata = {"Software": None} if extension == "png" else {"Date": None}
@@ -198,8 +199,8 @@ def save_recorded_figures(
     return tuple(names)
 
 
-def _head(figure: Figure, words: str) -> None:
-    """Put words above the legend of a figure, so that it tells what it shows wherever it goes."""
+def name_figure(figure: Figure, words: str) -> None:
+    """Put words above its legend, so that a figure tells what it shows wherever it goes."""
     inside = [box for ax in figure.axes if (box := ax.get_legend())]
     for box in [*figure.legends, *inside]:
         box.set_title(words, prop=FontProperties(size=NORMAL, weight="bold"))

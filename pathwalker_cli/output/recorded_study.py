@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Final
 
 from pathwalker_cli.conventions import Condition
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.inverse.study_tables import ResidualTable, StrengthTable
+from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.output.recorded_figures import save_recorded_figures
 from pathwalker_cli.output.recorded_files import (
     write_marker_table,
@@ -17,8 +19,13 @@ from pathwalker_cli.output.recorded_files import (
     write_strengths_yaml,
     write_trial,
 )
+from pathwalker_cli.output.versions import today, versions
+from pathwalker_cli.patient import Patient
 
-__all__ = ["write_dynamics", "write_kinematics"]
+__all__ = ["ORIGIN", "write_dynamics", "write_kinematics", "write_origin"]
+
+ORIGIN: Final = "study.json"
+"""File that says whose recorded gait was studied, how and when."""
 
 
 def write_kinematics(folder: Path, trials: Sequence[StudyTrial], body_mass: float) -> None:
@@ -62,6 +69,21 @@ def write_dynamics(
         write_strengths(folder / "strengths.csv", strengths)
         source = f"inverse dynamics of recorded barefoot gait, method {method}"
         write_strengths_yaml(folder / "strengths.yaml", strengths.strengths, source)
+
+
+def write_origin(folder: Path, patient: Patient, method: str) -> None:
+    """Write whose gait was studied, by which method, when and with which versions."""
+    content = {
+        "patient": patient.id,
+        "age": patient.age,
+        "body_mass": patient.body_mass,
+        "height": patient.height,
+        "method": method,
+        "date": today(),
+        "versions": versions(),
+        "notes": list(patient.notes),
+    }
+    write_json(folder / ORIGIN, content)
 
 
 def _by_condition(trials: Iterable[StudyTrial]) -> dict[Condition, list[StudyTrial]]:

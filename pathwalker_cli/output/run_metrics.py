@@ -18,7 +18,7 @@ from pathwalker_cli.ocp.balance import balance
 from pathwalker_cli.ocp.goal_costs import goal_values
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output.metrics import gait_metrics
-from pathwalker_cli.output.versions import versions
+from pathwalker_cli.output.versions import today, versions
 from pathwalker_cli.patient import Patient
 
 __all__ = ["RUN_FORMAT", "RunInputs", "run_inputs", "run_metrics", "sha256", "stiffness_ranges"]
@@ -149,6 +149,7 @@ def _origin(solution: GaitSolution, config: StudyConfig, inputs: RunInputs) -> d
         "warm_start": inputs.warm_start or None,
         "dynamics_backend": solution.walker.backend,
         "published_model": config.model.published,
+        "date": today(),
         "versions": versions(),
         "input_hashes": inputs.hashes,
     }

@@ -12,6 +12,7 @@ from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.ocp.verify import ActiveBound
 
 __all__ = [
+    "bound_line",
     "bound_lines",
     "detail_lines",
     "failure_text",
@@ -40,21 +41,22 @@ def bound_lines(solution: GaitSolution) -> list[str]:
     if not solution.converged:
         return []
     return [
-        _bound_line(bound)
+        bound_line(bound)
         for bound in solution.active
         if interesting(bound) and bound.name not in STIFFNESSES
     ]
 
 
-def _bound_line(bound: ActiveBound) -> str:
+def bound_line(bound: ActiveBound) -> str:
+    """Return an active bound in words."""
     where = f" in {', '.join(bound.places)}" if bound.places else ""
     if bound.name in _ANGLES:
         amount = f"{bound.value:.3f} rad ({to_degrees(bound.value):.1f} deg)"
     else:
-        amount = f"{bound.value:.4g} {_UNITS[bound.name]}"
-    name = {"walking_speed": "walking speed", "duration": "phase duration"}.get(
-        bound.name, bound.name
-    )
+        amount = f"{bound.value:.4g} {_UNITS.get(bound.name, 'N m/rad')}"
+    name = {"duration": "phase duration"}.get(bound.name, bound.name)
+    if bound.name not in _ANGLES:
+        name = name.replace("_", " ")
     return f"{name} at its {bound.side} bound {amount}{where}"
 
 

@@ -1,15 +1,16 @@
-"""Versions of what a result depends on."""
+"""Versions of what a result depends on, and its date."""
 
 from __future__ import annotations
 
 import platform
+from datetime import UTC, datetime
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Final
 
 from pathwalker_cli import __version__
 
-__all__ = ["MISSING", "versions"]
+__all__ = ["MISSING", "today", "versions"]
 
 MISSING: Final = "missing"
 """Stands for the version of a package that is not installed."""
@@ -21,6 +22,11 @@ _PACKAGES: Final = {
     "scipy": "scipy",
 }
 """Distributions and the modules that they install."""
+
+
+def today() -> str:
+    """Return the date of today, UTC."""
+    return datetime.now(UTC).date().isoformat()
 
 
 def versions() -> dict[str, str]:

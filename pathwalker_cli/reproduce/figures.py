@@ -11,8 +11,8 @@ from typing import Final
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from pathwalker_cli.evaluation.evaluate import Evaluation
 from pathwalker_cli.evaluation.figures import ankle_figure, ground_force_figure, joint_angle_figure
+from pathwalker_cli.evaluation.traces import Trace, lone_trace
 from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.output.figures import orthosis_curves
 from pathwalker_cli.output.figures.save import save_formats
@@ -94,12 +94,12 @@ def _plans(results: Results) -> Iterator[_Plan]:
             lambda: activation_figure(*gaits),
         )
     if "mapd-orthosis" in solved:
-        evaluation = _evaluation(solved["mapd-orthosis"])
+        trace = _trace(solved["mapd-orthosis"])
         yield _Plan(
             "figure-7",
             "Figure 7: net ankle torque over ankle angle in stance, MAPD-Orthosis and recordings "
             "with orthoses.",
-            lambda: ankle_figure(evaluation),
+            lambda: ankle_figure(trace),
         )
 
 
@@ -111,17 +111,17 @@ def _orthosis(result: ProblemResult) -> _Plan:
 
 
 def _kinds(
-    solved: Mapping[str, ProblemResult], name: str, what: str, make: Callable[[Evaluation], Figure]
+    solved: Mapping[str, ProblemResult], name: str, what: str, make: Callable[[Trace], Figure]
 ) -> Iterator[_Plan]:
     """Yield one figure per problem of what the article shows in one figure."""
     number = name.replace("figure-", "Figure ")
     for problem in (*_ARTICLE, *_BEYOND):
         if problem in solved:
-            evaluation = _evaluation(solved[problem])
+            trace = _trace(solved[problem])
             beyond = " (not in the article's main text)" if problem in _BEYOND else ""
-            band = "" if evaluation.recorded is None else ", over the recorded range"
+            band = "" if trace.recorded is None else ", over the recorded range"
             caption = f"{number}, {_NAMES[problem]}{beyond}: {what}{band}."
-            yield _Plan(f"{name}-{problem}", caption, partial(make, evaluation))
+            yield _Plan(f"{name}-{problem}", caption, partial(make, trace))
 
 
 def _series(result: ProblemResult) -> GaitSeries:
@@ -131,8 +131,8 @@ def _series(result: ProblemResult) -> GaitSeries:
     return result.series
 
 
-def _evaluation(result: ProblemResult) -> Evaluation:
-    """Return the comparison of a converged problem with the recordings."""
+def _trace(result: ProblemResult) -> Trace:
+    """Return the gait of a converged problem over the recordings."""
     if result.evaluation is None:
         raise ValueError(f"{result.problem} did not converge")
-    return result.evaluation
+    return lone_trace(result.evaluation.gait, result.evaluation.recorded)

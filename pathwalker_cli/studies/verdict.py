@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
+from pathwalker_cli.errors import DataError
 from pathwalker_cli.model.walker import ANKLES
 from pathwalker_cli.ocp.neighbourhood import Neighbourhood
 from pathwalker_cli.ocp.resolve import Optimum, Resolver
@@ -22,7 +23,15 @@ from pathwalker_cli.patient_blocks import RealSpring
 from pathwalker_cli.studies.edges import Edge, find_edge
 from pathwalker_cli.studies.springs import ends, spring_ranges
 
-__all__ = ["SHARE", "SnappedSprings", "SpringVerdict", "StopVerdict", "Verdict", "verdict_of"]
+__all__ = [
+    "SHARE",
+    "SnappedSprings",
+    "SpringVerdict",
+    "StopVerdict",
+    "Verdict",
+    "verdict_of",
+    "verdict_of_metrics",
+]
 
 SHARE: Final = 0.05
 """Rise of the cost that still counts as good."""
@@ -32,6 +41,8 @@ _DETERMINED: Final = 0.25
 
 _ROUGHLY: Final = 0.75
 """Share of the range of springs up to which a region still says something."""
+
+_Part = TypeVar("_Part")
 
 _CANDIDATES: Final = 2
 """Real springs next to an identified stiffness that are considered."""
@@ -182,6 +193,35 @@ def verdict_of(solution: GaitSolution) -> Verdict | None:
         solves=judge.solves,
         seconds=time.perf_counter() - began,
     )
+
+
+def verdict_of_metrics(metrics: Mapping[str, Any]) -> Verdict | None:
+    """Return the verdict that the metrics of a run hold, None without one.
+
+    Raises:
+        DataError: If it is not one that `Verdict.as_dict` wrote.
+    """
+    plain = metrics.get("verdict")
+    if plain is None:
+        return None
+    try:
+        snapped = plain["snapped"]
+        return Verdict(
+            springs=tuple(_part(SpringVerdict, each) for each in plain["springs"]),
+            stops=tuple(_part(StopVerdict, each) for each in plain["stops"]),
+            snapped=None if snapped is None else _part(SnappedSprings, snapped),
+            optima=tuple(_part(LocalOptimum, each) for each in plain["optima"]),
+            **{name: plain[name] for name in ("starts", "solves", "seconds")},
+        )
+    except (KeyError, TypeError, AttributeError) as problem:
+        what = f"is not what `pathwalker solve` wrote: {problem}"
+        raise DataError(what, where="verdict in metrics.json", mend="solve again") from None
+
+
+def _part(kind: type[_Part], plain: Mapping[str, Any]) -> _Part:
+    """Return a dataclass from plain values; lists become tuples, what it does not hold is left."""
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    return kind(**{n: tuple(v) if isinstance(v := plain[n], list) else v for n in names})
 
 
 class _Judge:

@@ -11,7 +11,7 @@ from pathwalker_cli.conventions import to_degrees
 from pathwalker_cli.studies.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, StopVerdict, Verdict
 
-__all__ = ["verdict_lines"]
+__all__ = ["per_degree", "reservations", "stop_text", "verdict_lines"]
 
 _SOFTER: Final = {"lower": ("softer", -1.0), "upper": ("stiffer", 1.0)}
 
@@ -21,7 +21,7 @@ def verdict_lines(verdict: Verdict) -> Iterator[tuple[str, str]]:
     for spring in verdict.springs:
         yield measure_of(spring.spring).label, _spring(spring)
     reached = [stop for stop in verdict.stops if stop.excess > 0.0]
-    yield "hard stops", "; ".join(map(_stop, reached)) or "none is reached"
+    yield "hard stops", "; ".join(map(stop_text, reached)) or "none is reached"
     if verdict.starts > 1:
         yield "other optima", _optima(verdict)
     else:
@@ -30,33 +30,37 @@ def verdict_lines(verdict: Verdict) -> Iterator[tuple[str, str]]:
     yield "verdict", f"{verdict.solves} problems solved around the optimum, {verdict.seconds:.1f} s"
 
 
-def _per_degree(stiffness: float) -> float:
-    """Return a stiffness in N m/deg."""
+def per_degree(stiffness: float) -> float:
+    """Return a stiffness in N m/deg from N m/rad."""
     return float(np.deg2rad(stiffness))
 
 
 def _spring(spring: SpringVerdict) -> str:
     low, high = spring.region
     text = (
-        f"{spring.stiffness:.1f} N m/rad ({_per_degree(spring.stiffness):.2f} N m/deg): "
+        f"{spring.stiffness:.1f} N m/rad ({per_degree(spring.stiffness):.2f} N m/deg): "
         f"{spring.determined}; the cost stays within {100 * SHARE:g} % of the best from "
-        f"{low:.1f} to {high:.1f} N m/rad ({_per_degree(low):.2f} to {_per_degree(high):.2f} "
+        f"{low:.1f} to {high:.1f} N m/rad ({per_degree(low):.2f} to {per_degree(high):.2f} "
         f"N m/deg), {100 * spring.width:.0f} % of the springs that are allowed"
     )
+    return "; ".join([text, *reservations(spring)])
+
+
+def reservations(spring: SpringVerdict) -> Iterator[str]:
+    """Yield what to know of a spring beside its region: other optima, limits, doubts."""
     far = [end for end, again in zip(spring.range, spring.again, strict=True) if again]
     if far:
         ends = " and ".join(f"{end:.1f}" for end in far)
-        text += f", and is as good again at {ends} N m/rad, another local optimum"
+        yield f"the cost is as good again at {ends} N m/rad, another local optimum"
     if spring.limit:
         word, sign = _SOFTER[spring.limit]
         saved = -100.0 * sign * spring.gradient * _ten_percent(spring)
-        text += (
-            f"; it sits at the {spring.limit} limit: {_ten_percent(spring):.1f} N m/rad {word} "
+        yield (
+            f"it sits at the {spring.limit} limit: {_ten_percent(spring):.1f} N m/rad {word} "
             f"would save about {saved:.2g} % more"
         )
     if not spring.certain:
-        text += "; the ends of this region are not certain: the problems beyond did not converge"
-    return text
+        yield "the ends of this region are not certain: the problems beyond did not converge"
 
 
 def _ten_percent(spring: SpringVerdict) -> float:
@@ -64,7 +68,8 @@ def _ten_percent(spring: SpringVerdict) -> float:
     return 0.1 * spring.stiffness
 
 
-def _stop(stop: StopVerdict) -> str:
+def stop_text(stop: StopVerdict) -> str:
+    """Return how far and how long the ankle goes beyond a stop."""
     return (
         f"{stop.side} {stop.stop} stop ({to_degrees(abs(stop.angle)):.1f} deg) exceeded by "
         f"{to_degrees(stop.excess):.1f} deg, {100 * stop.share:.0f} % of the stride"
@@ -89,7 +94,7 @@ def _snapped(verdict: Verdict) -> str:
         return "the patient's file lists none (orthosis.springs)"
     chosen = ", ".join(
         f"{measure_of(name).label} {snapped.names[name]} ({stiffness:.1f} N m/rad, "
-        f"{_per_degree(stiffness):.2f} N m/deg)"
+        f"{per_degree(stiffness):.2f} N m/deg)"
         for name, stiffness in snapped.stiffness.items()
     )
     if snapped.status == "converged":

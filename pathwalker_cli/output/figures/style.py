@@ -16,6 +16,7 @@ from pathwalker_cli.output.cycle import BOTH_SIDES, OwnCycle
 
 __all__ = [
     "BODY_COLOUR",
+    "COLUMN",
     "FORCE_COLOUR",
     "FORCE_LENGTH",
     "LINE_COLOUR",
@@ -33,12 +34,15 @@ __all__ = [
     "new_figure",
     "percent_axis",
     "side_handles",
+    "small_labels",
     "toe_off_line",
     "zero_line",
 ]
 
 PAGE: Final = 7.0
 """Width of a printed page [in]."""
+COLUMN: Final = 3.35
+"""Width of a printed column [in]: 85 mm."""
 
 LINE_COLOUR: Final[dict[Side, str]] = {"right": "#0072B2", "left": "#D55E00"}
 """Blue and vermilion of the palette by Okabe and Ito, told apart with any colour vision."""
@@ -94,6 +98,12 @@ def dress(ax: Axes, title: str = "", x: str = "", y: str = "") -> None:
     ax.set_axisbelow(True)
 
 
+def small_labels(ax: Axes) -> None:
+    """Let title and labels be as small as the ticks, for panels that share a column."""
+    for text in (ax.title, ax.xaxis.label, ax.yaxis.label):
+        text.set_fontsize(SMALL)
+
+
 def percent_axis(ax: Axes, label: bool = True) -> None:
     """Let the x axis run over a gait cycle that begins with the side's own foot strike."""
     ax.set_xlim(0.0, 100.0)
@@ -129,13 +139,13 @@ def band_handle() -> Artist:
     return Patch(facecolor="#bbbbbb", alpha=0.6, label="recorded: range, thin line: mean")
 
 
-def legend(fig: Figure, handles: Iterable[Artist]) -> None:
-    """Put one legend in a row above all axes."""
+def legend(fig: Figure, handles: Iterable[Artist], columns: int = 0) -> None:
+    """Put one legend above all axes, in a row unless a number of columns is given."""
     entries = list(handles)
     fig.legend(
         handles=entries,
         loc="outside upper center",
-        ncols=len(entries),
+        ncols=columns or len(entries),
         frameon=False,
         handlelength=2.6,
     )

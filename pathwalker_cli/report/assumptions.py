@@ -1,0 +1,146 @@
+"""What a run stands on: model, sources, active bounds, proof, versions and config."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.ocp.verify import ActiveBound
+from pathwalker_cli.output.solve_text import bound_line, interesting, source_lines
+from pathwalker_cli.report.content import Section, fact_table
+from pathwalker_cli.report.runs import ReportRun
+
+__all__ = ["assumption_section", "config_differences", "flat_config"]
+
+_METHODS: Final = {
+    "collocation": "direct collocation",
+    "multiple-shooting": "direct multiple shooting",
+}
+_HASH: Final = 12
+"""Digits of a hash that tell files apart."""
+
+
+def assumption_section(runs: Sequence[ReportRun]) -> Section:
+    """Return what was assumed and what was reached, a column per run."""
+    columns = [dict(_facts(run)) for run in runs]
+    labels = dict.fromkeys(label for column in columns for label in column)
+    rows = tuple((label, *(column.get(label, "-") for column in columns)) for label in labels)
+    head = ("", *(run.label for run in runs))
+    return Section("What was assumed, and what was reached", tables=(fact_table(rows, head),))
+
+
+def config_differences(config: StudyConfig) -> dict[str, str]:
+    """Return the keys of a config whose values are not the defaults of its problem."""
+    bare = flat_config(StudyConfig(problem=config.problem, patient=config.patient))
+    return {key: text for key, text in flat_config(config).items() if bare.get(key) != text}
+
+
+def flat_config(config: StudyConfig) -> dict[str, str]:
+    """Return every value of a config as text by dotted key."""
+    return dict(_flat("", config.model_dump(mode="json")))
+
+
+def _flat(prefix: str, content: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for key, value in content.items():
+        if isinstance(value, Mapping) and value:
+            yield from _flat(f"{prefix}{key}.", value)
+        else:
+            yield f"{prefix}{key}", str(value)
+
+
+def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
+    """Yield label and sentence."""
+    metrics, config = run.run.metrics, run.run.config
+    walker = run.evaluation.gait.walker
+    goal = "nearest to a recording" if config.fits else "least squared activation per distance"
+    quirks = ", with the quirks of the published model" if metrics.get("published_model") else ""
+    yield (
+        "Model",
+        (
+            f"flat rigid-body walker of {walker.total_mass:.1f} kg in all with 14 muscle torque "
+            f"generators, two contact points per foot; dynamics back end "
+            f"{_text(metrics, 'dynamics_backend')}{quirks}; assumed aim: {goal}"
+        ),
+    )
+    notes = metrics.get("notes") or []
+    yield (
+        "Mass, strengths",
+        ". ".join(
+            [
+                f"body mass {run.patient.body_mass:g} kg and strengths from the patient's file",
+                *map(str, notes),
+            ]
+        ),
+    )
+    yield "Active bounds", "; ".join(_bounds(metrics)) or "none that shapes the gait"
+    yield (
+        "Tolerances",
+        (
+            f"optimality {config.solver.tolerance:g}, constraints "
+            f"{config.solver.constraint_tolerance:g}; reached: largest violation "
+            f"{_short(metrics, 'largest_violation')} ({_text(metrics, 'largest_violation_name')})"
+        ),
+    )
+    yield (
+        "Re-integration",
+        (
+            "an independent integrator misses the next node by at most "
+            f"{_short(metrics, 'reintegration_position_error')} rad or m and "
+            f"{_short(metrics, 'reintegration_velocity_error')} rad/s or m/s (asked for: "
+            f"{config.mesh.position_tolerance:g}, {config.mesh.velocity_tolerance:g})"
+        ),
+    )
+    yield (
+        "Second engine",
+        (
+            "numeric Pinocchio meets the equations of motion within "
+            f"{_short(metrics, 'second_engine_residual')} N or N m"
+        ),
+    )
+    yield (
+        "Mesh, iterations",
+        (
+            f"{_METHODS.get(config.transcription, config.transcription)}, "
+            f"{_text(metrics, 'intervals')} intervals, {_text(metrics, 'iterations')} iterations; "
+            f"start: {_text(metrics, 'start')}; cost {_short(metrics, 'cost', '.5g')}"
+        ),
+    )
+    versions = metrics.get("versions") or {}
+    yield "Versions", ", ".join(f"{name} {number}" for name, number in versions.items())
+    hashes = metrics.get("input_hashes") or {}
+    yield "Inputs", ", ".join(f"{name} {str(h)[:_HASH]}" for name, h in hashes.items())
+    changed = config_differences(config)
+    yield "Config", "; ".join(f"{k} = {v}" for k, v in changed.items()) or "all defaults"
+
+
+def _bounds(metrics: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the active bounds that are choices, where they come from, and how many others."""
+    bounds = [bound for text in metrics.get("active_bounds") or () if (bound := _bound(str(text)))]
+    chosen = [bound for bound in bounds if interesting(bound)]
+    yield from map(bound_line, chosen)
+    given = metrics.get("bound_sources") or {}
+    sources = {b.name: given[b.name] for b in chosen if b.name in given}
+    yield from source_lines(sources)
+    others = len(metrics.get("active_bounds") or ()) - len(chosen)
+    if others:
+        yield f"{others} more of muscles, ground forces and foot heights at their natural limits"
+
+
+def _bound(text: str) -> ActiveBound | None:
+    """Return an active bound of the metrics, None if it is told in another way."""
+    try:
+        return ActiveBound.parse(text)
+    except ValueError:
+        return None
+
+
+def _short(metrics: Mapping[str, Any], key: str, form: str = ".1e") -> str:
+    """Return a number of the metrics, "unknown" if it is none."""
+    value = metrics.get(key)
+    return format(value, form) if isinstance(value, int | float) else "unknown"
+
+
+def _text(metrics: Mapping[str, Any], key: str) -> str:
+    value = metrics.get(key)
+    return "unknown" if value is None else str(value)

@@ -1,0 +1,104 @@
+"""The figures of a page: a column wide each, right beside left, runs over one another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from pathwalker_cli.evaluation.cycle_curves import (
+    ACTIVATIONS,
+    ANGLES,
+    FORCES,
+    MOMENTS,
+    CycleCurve,
+    known_curves,
+)
+from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_handles
+from pathwalker_cli.evaluation.traces import Trace, lone_trace, traces
+from pathwalker_cli.inverse.evaluate import StudyTrial
+from pathwalker_cli.output.figures.inline import inline_svg
+from pathwalker_cli.output.figures.style import COLUMN, STYLE, legend, new_figure
+from pathwalker_cli.output.recorded_figures import joint_torque_figure, name_figure
+from pathwalker_cli.report.content import Drawing, Section, Shape
+from pathwalker_cli.report.runs import ReportRun
+
+__all__ = ["curve_section", "torque_drawing"]
+
+
+def curve_section(runs: Sequence[ReportRun]) -> Section:
+    """Return angles, ground forces, moments, ankle torque over angle and activations."""
+    shown = _traces(runs)
+    names = " and ".join(trace.label for trace in shown)
+    drawings = [
+        *(_cycle(curve, shown, names) for curve in (*ANGLES, *FORCES, *MOMENTS)),
+        _drawn(
+            lambda: ankle_pair(shown),
+            "ankle-torque",
+            f"Net ankle torque [N m] over dorsiflexion [deg] in stance, right and left: {names}",
+            "tall",
+        ),
+        *(_cycle(curve, shown, names) for curve in known_curves(ACTIVATIONS, shown)),
+    ]
+    return Section(
+        "Curves over the gait cycle",
+        ("Each side from its own foot strike to its next one. Dots: least knee flexion of stance; "
+         "foot strike at the ankle, where numbers are the slopes of the dotted lines.",),
+        legend=_legend(shown),
+        drawings=tuple(drawings),
+    )  # fmt: skip
+
+
+def torque_drawing(
+    trials: Sequence[StudyTrial], body_mass: float, name: str, title: str
+) -> Drawing:
+    """Return the recorded joint torques of one condition.
+
+    Args:
+        trials: Trials of one condition.
+        body_mass: Mass of the patient [kg].
+        name: A name that no other figure of the page has.
+        title: What it shows.
+    """
+
+    def draw() -> Figure:
+        figure = joint_torque_figure(trials, body_mass)
+        name_figure(figure, f"{trials[0].condition}, {len(trials)} trials")
+        return figure
+
+    return _drawn(draw, name, title, "wide")
+
+
+def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
+    """Return the gaits of the runs over their recordings."""
+    found = [(run.evaluation.gait, run.evaluation.recorded) for run in runs]
+    if len(found) == 1:
+        return (lone_trace(*found[0]),)
+    gaits, recorded = zip(*found, strict=True)
+    return traces(gaits, [run.label for run in runs], recorded)
+
+
+def _cycle(curve: CycleCurve, shown: Sequence[Trace], names: str) -> Drawing:
+    """Return a quantity of both sides over the gait cycle."""
+    title = f"{curve.name}, {curve.label} over the gait cycle, right and left: {names}"
+    return _drawn(lambda: cycle_pairs([curve], shown), curve.key.replace("_", "-"), title)
+
+
+def _legend(shown: Sequence[Trace]) -> Drawing:
+    """Return the legend of all figures over the gait cycle."""
+    handles = legend_handles(shown)
+
+    def draw() -> Figure:
+        figure = new_figure(COLUMN, 0.17 * ((len(handles) + 1) // 2) + 0.06)
+        legend(figure, handles, columns=2)
+        return figure
+
+    return _drawn(draw, "legend", "Legend of the curves")
+
+
+def _drawn(draw: Callable[[], Figure], name: str, title: str, shape: Shape = "pair") -> Drawing:
+    """Return a figure as it stands on the page."""
+    with mpl.rc_context(STYLE):
+        figure = draw()
+    return Drawing(inline_svg(figure, name, title[:1].upper() + title[1:]), shape)

@@ -1,0 +1,181 @@
+"""What the folders of a report are: runs, studies around them, recorded gait, cohorts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from pathwalker_cli.errors import DataError
+
+__all__ = ["STUDIES", "Kind", "Study", "folder_kind", "read_json", "sorted_folders", "studies_near"]
+
+Kind = Literal["run", "recorded", "cohort", "perturb", "sensitivity", "landscape"]
+
+_MARKS: Final[tuple[tuple[Kind, str], ...]] = (
+    ("run", "metrics.json"),
+    ("perturb", "perturbation.json"),
+    ("sensitivity", "sensitivity.json"),
+    ("landscape", "landscape.json"),
+    ("cohort", "cases.csv"),
+    ("recorded", "stances.csv"),
+)
+"""A file that only such a folder has."""
+
+STUDIES: Final[Mapping[Kind, str]] = {
+    kind: file for kind, file in _MARKS if kind in ("perturb", "sensitivity", "landscape")
+}
+"""The studies around an optimum and their summaries."""
+
+_ALLOWED: Final = (
+    "folders that solve, id, batch, perturb, sensitivity or landscape of pathwalker wrote"
+)
+
+_SAME: Final = 0.02
+"""Relative difference up to which a study stands on a run: it solves the optimum again, to a
+tolerance of its own, which may move springs that the cost does not determine."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study around an optimum.
+
+    Args:
+        folder: Its folder.
+        kind: Which command made it.
+        content: Its summary.
+    """
+
+    folder: Path
+    kind: Kind
+    content: Mapping[str, Any]
+
+    @property
+    def optimum(self) -> Mapping[str, Any]:
+        """Measures of the optimum that it stands on."""
+        found = self.content.get("optimum") or self.content.get("start", {}).get("measures", {})
+        return found if isinstance(found, Mapping) else {}
+
+    def stands_on(self, metrics: Mapping[str, Any]) -> bool:
+        """Return whether a run is the one around which the study was made."""
+        if any(self.content.get(key) != metrics.get(key) for key in ("problem", "patient")):
+            return False
+        optimum = self.optimum
+        return all(_near(optimum.get(key), metrics.get(key)) for key in ("cost", "walking_speed"))
+
+
+def _near(one: Any, other: Any) -> bool:
+    numbers = isinstance(one, int | float) and isinstance(other, int | float)
+    return numbers and abs(one - other) <= _SAME * max(abs(one), abs(other))
+
+
+def folder_kind(folder: Path) -> Kind:
+    """Return what a folder is.
+
+    Raises:
+        DataError: If it is nothing that a report can be made of.
+    """
+    if not folder.is_dir():
+        raise DataError("no such folder", where=str(folder), allowed=_ALLOWED)
+    found = _kind(folder)
+    if found is None:
+        raise DataError("holds nothing to report", where=str(folder), allowed=_ALLOWED)
+    return found
+
+
+def _kind(folder: Path) -> Kind | None:
+    return next((kind for kind, file in _MARKS if (folder / file).is_file()), None)
+
+
+def sorted_folders(folders: Sequence[Path]) -> dict[Kind, tuple[Path, ...]]:
+    """Return folders by what they are, in the order given.
+
+    Raises:
+        DataError: If one is named twice, is nothing to report, or they do not go together.
+    """
+    found: dict[Kind, tuple[Path, ...]] = {}
+    places = [folder.resolve() for folder in folders]
+    for folder, place in zip(folders, places, strict=True):
+        if places.count(place) > 1:
+            raise DataError("is named twice", where=str(folder), allowed="each folder once")
+        kind = folder_kind(folder)
+        found[kind] = (*found.get(kind, ()), folder)
+    pages = [kind for kind in ("run", "recorded", "cohort") if kind in found]
+    studies = [kind for kind in found if kind in STUDIES]
+    if len(pages) > 1:
+        raise DataError(
+            f"{found[pages[0]][0]} and {found[pages[1]][0]} do not go on one page",
+            allowed="runs with their studies, or folders of id, or folders of batch",
+            mend="write a report for each",
+        )
+    if studies and pages != ["run"]:
+        raise DataError(
+            "is a study around a run that was not named",
+            where=str(found[studies[0]][0]),
+            mend="name the run too",
+        )
+    return found
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Return the content of a JSON file that holds a mapping.
+
+    Raises:
+        DataError: If it cannot be read.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
+        raise DataError(f"cannot be read: {problem}", where=str(path)) from None
+    if not isinstance(content, dict):
+        raise DataError("is no summary of a study", where=str(path), mend="make it again")
+    return content
+
+
+def studies_near(
+    runs: Sequence[tuple[Path, Mapping[str, Any]]], named: Mapping[Kind, Sequence[Path]]
+) -> tuple[Study, ...]:
+    """Return the studies that stand on one of the runs: named ones, and those found near.
+
+    Near is inside the folder of a run, beside it, or around it. Of each kind at most one counts.
+
+    Args:
+        runs: Folder and metrics of every run.
+        named: Folders of studies by kind.
+
+    Raises:
+        DataError: If a study that was named stands on none of the runs.
+    """
+    found: dict[Kind, Study] = {}
+    for kind, file in STUDIES.items():
+        for folder in named.get(kind, ()):
+            study = Study(folder, kind, read_json(folder / file))
+            if not any(study.stands_on(metrics) for _, metrics in runs):
+                raise DataError(
+                    "stands on another optimum than the runs of this report",
+                    where=str(folder),
+                    allowed="a study around one of them (--run RUN)",
+                )
+            if kind in found:
+                raise DataError(f"is a second {kind} study", where=str(folder), allowed="one")
+            found[kind] = study
+    for folder, metrics in runs:
+        for kind, place in _near_folders(folder):
+            if kind not in found:
+                study = Study(place, kind, read_json(place / STUDIES[kind]))
+                if study.stands_on(metrics):
+                    found[kind] = study
+    return tuple(found[kind] for kind in STUDIES if kind in found)
+
+
+def _near_folders(folder: Path) -> list[tuple[Kind, Path]]:
+    """Return the studies near a run."""
+    around = folder.resolve().parent
+    try:
+        places = sorted({around, *folder.resolve().iterdir(), *around.iterdir()})
+    except OSError:
+        return []
+    kinds = [(_kind(place), place) for place in places if place.is_dir()]
+    return [(kind, place) for kind, place in kinds if kind in STUDIES and kind is not None]

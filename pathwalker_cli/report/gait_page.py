@@ -1,0 +1,106 @@
+"""The page about one patient: recommended springs, gait, curves, studies, assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pathwalker_cli.conventions import SIDES, to_degrees
+from pathwalker_cli.evaluation.evaluate import Change
+from pathwalker_cli.evaluation.text import number_text
+from pathwalker_cli.report.assumptions import assumption_section
+from pathwalker_cli.report.content import Fact, Page
+from pathwalker_cli.report.figures import curve_section
+from pathwalker_cli.report.folders import Study
+from pathwalker_cli.report.gait_table import gait_section
+from pathwalker_cli.report.runs import ReportRun, changes_of
+from pathwalker_cli.report.springs import recommended, spring_section
+from pathwalker_cli.report.study_tables import study_section
+from pathwalker_cli.studies.measures import measure_of
+
+__all__ = ["gait_page"]
+
+
+def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
+    """Return the page about the runs of one patient.
+
+    Args:
+        runs: The runs, barefoot ones first.
+        studies: Studies around one of them.
+    """
+    patient, changes = runs[0].patient, changes_of(runs)
+    worn = [run for run in runs if run.worn]
+    sections = [spring_section(run) for run in worn]
+    sections += [gait_section(runs, changes), curve_section(runs)]
+    sections += [study_section(study) for study in studies]
+    sections.append(assumption_section(runs))
+    facts = (
+        Fact("Patient", patient.id),
+        Fact("Age", f"{patient.age:g} years"),
+        Fact("Mass", f"{patient.body_mass:g} kg"),
+        Fact("Height", f"{patient.height:g} m"),
+        *_of_runs(runs),
+    )
+    answer = " ".join(_answer(run, changes) for run in worn or runs)
+    return Page(f"Gait of {patient.id}", facts, answer, tuple(_warnings(runs)), tuple(sections))
+
+
+def _of_runs(runs: Sequence[ReportRun]) -> list[Fact]:
+    """Return problem and date of every run; one date where they agree."""
+    problems = ", ".join(f"{run.run.config.problem} ({run.label})" for run in runs)
+    dates = dict.fromkeys(run.date for run in runs)
+    if len(dates) == 1:
+        date = next(iter(dates))
+    else:
+        date = ", ".join(f"{run.date} ({run.label})" for run in runs)
+    return [Fact("Problems" if len(runs) > 1 else "Problem", problems), Fact("Date", date)]
+
+
+def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
+    """Return what a run says in one sentence."""
+    row = run.evaluation.row
+    speed = number_text(row("walking_speed").value, row("walking_speed").quantity)
+    knees = " and ".join(
+        f"{to_degrees(run.run.metrics[f'min_stance_knee_flexion_{side}']):.1f} deg {side}"
+        for side in SIDES
+    )
+    gait = f"at {speed} m/s with a least stance knee flexion of {knees}"
+    if not run.worn:
+        return f"Predicted {run.label} gait walks {gait}."
+    effort = next((c for c in changes if c.quantity.key == "effort_per_distance"), None)
+    saved = ""
+    if effort is not None:
+        values = [number_text(v, effort.quantity) for v in (effort.barefoot, effort.orthosis)]
+        share = 100.0 * effort.value / effort.barefoot
+        saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot ({share:+.0f} %)"
+    real = run.verdict is not None and run.verdict.snapped is not None
+    kind = "Springs to take" if real else "Springs of least effort"
+    return f"{kind}: {_springs(run)}; predicted gait walks {gait}{saved}."
+
+
+def _springs(run: ReportRun) -> str:
+    """Return the springs with how sure they are, sides that agree together."""
+    stiffness, verdict = recommended(run), run.verdict
+    sure = {s.spring: s.determined for s in verdict.springs} if verdict else {}
+    parts: dict[str, list[str]] = {}
+    for name, value in stiffness.items():
+        kind, _, side = measure_of(name).label.rpartition(" ")
+        words = f"{kind} {value:.1f} N m/rad"
+        words += f" ({sure[name]})" if name in sure else ""
+        parts.setdefault(words, []).append(side)
+    return ", ".join(f"{words} {' and '.join(sides)}" for words, sides in parts.items())
+
+
+def _warnings(runs: Sequence[ReportRun]) -> list[str]:
+    """Return what must be known before the answer is used."""
+    found = []
+    for run in runs:
+        if run.run.config.smoke:
+            found.append(
+                f"{run.label}: a quick check on a coarse mesh: numbers for orientation only"
+            )
+        if run.patient_changed:
+            found.append(
+                f"{run.label}: the patient's file is no longer that of the run; age, mass, height "
+                "and forces per weight are those of today's file"
+            )
+    return found

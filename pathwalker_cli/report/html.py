@@ -1,0 +1,48 @@
+"""A page as one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Final
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from pathwalker_cli import __version__
+from pathwalker_cli.report.content import Drawing, Page
+
+__all__ = ["page_html"]
+
+_UNIT: Final = re.compile(r"(?<=\d) (?=%|N m|m/s|s/m|deg\b|kg\b)|(?<=\bN) (?=m\b)")
+"""Spaces before and within units."""
+
+
+def page_html(page: Page) -> str:
+    """Return a page as HTML; all its texts are escaped, the figures are ours."""
+    return _environment().get_template("page.html.j2").render(page=page, version=__version__)
+
+
+@cache
+def _environment() -> Environment:
+    """Return the templates of this package, which escape everything."""
+    environment = Environment(
+        loader=PackageLoader("pathwalker_cli.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters |= {"svg": _svg, "tight": _tight}
+    return environment
+
+
+def _tight(text: str) -> str:
+    """Return a text whose units do not part from their numbers at the end of a line."""
+    return _UNIT.sub("\N{NO-BREAK SPACE}", text)
+
+
+def _svg(drawing: Drawing) -> Markup:
+    """Return a figure without escaping: `inline_svg` wrote it, and escaped its texts."""
+    return Markup(drawing.svg)

@@ -1,0 +1,192 @@
+"""The page about recorded gait: stances, torques, residuals and strengths that `id` found."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from pathwalker_cli.conventions import CONDITIONS, SIDES, SUFFIX, Condition
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.evaluate import StudyTrial
+from pathwalker_cli.output.recorded_read import read_trials
+from pathwalker_cli.output.recorded_study import ORIGIN
+from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
+from pathwalker_cli.report.csv_table import number, read_rows
+from pathwalker_cli.report.figures import torque_drawing
+from pathwalker_cli.report.folders import read_json
+
+__all__ = ["recorded_page"]
+
+Rows = Sequence[Mapping[str, str]]
+
+_STANCES: Final = ("condition", "trial", "side", "strike", "toe-off", "measured", "reason")
+_STRENGTHS: Final = ("generator", "strength", "stances", "remark")
+_RESIDUALS: Final = ("condition", "part", "trial", "up mean")
+
+
+def recorded_page(folders: Sequence[Path]) -> Page:
+    """Return the page about one or more folders of `id`, of any patients.
+
+    Raises:
+        DataError: If a file cannot be used.
+    """
+    origins = [_origin(folder) for folder in folders]
+    sections = [
+        part
+        for i, (folder, origin) in enumerate(zip(folders, origins, strict=True))
+        for part in _sections(folder, origin, i)
+    ]
+    patients = ", ".join(dict.fromkeys(str(origin["patient"]) for origin in origins))
+    dates = ", ".join(dict.fromkeys(str(origin["date"]) for origin in origins))
+    measured = [read_rows(folder / "stances.csv", _STANCES) for folder in folders]
+    known = sum(row["measured"] == "yes" for rows in measured for row in rows)
+    seen = sum(map(len, measured))
+    answer = (
+        f"Joint torques are known in {known} of {seen} recorded stances; muscle strengths come "
+        "from the barefoot ones."
+    )
+    facts = (Fact("Patients" if "," in patients else "Patient", patients), Fact("Date", dates))
+    return Page(f"Recorded gait of {patients}", facts, answer, (), tuple(sections))
+
+
+def _origin(folder: Path) -> dict[str, Any]:
+    """Return whose gait a folder holds."""
+    if not (folder / ORIGIN).is_file():
+        raise DataError(
+            f"lacks {ORIGIN}, which says whose gait it is",
+            where=str(folder),
+            allowed="a folder that `pathwalker id` wrote",
+            mend="compute it again",
+        )
+    origin = read_json(folder / ORIGIN)
+    missing = [k for k in ("patient", "age", "body_mass", "height", "method") if k not in origin]
+    if missing or not isinstance(origin["body_mass"], int | float) or not origin["body_mass"] > 0.0:
+        raise DataError("does not say whose gait it is", where=str(folder / ORIGIN),
+                        mend="compute it again")  # fmt: skip
+    return {"date": "not kept", **origin}
+
+
+def _sections(folder: Path, origin: Mapping[str, Any], index: int) -> list[Section]:
+    """Return everything about one folder."""
+    stances = read_rows(folder / "stances.csv", _STANCES)
+    who = str(origin["patient"])
+    facts = tuple(
+        Fact(label, f"{origin[key]} {unit}".strip())
+        for label, key, unit in (
+            ("Age", "age", "years"), ("Mass", "body_mass", "kg"), ("Height", "height", "m"),
+            ("Method", "method", ""),
+        )
+    )  # fmt: skip
+    found = [Section(f"Recorded stances, {who}", facts=facts, tables=(_stance_table(stances),))]
+    drawings = [
+        drawing
+        for condition in CONDITIONS
+        for drawing in _torques(folder, condition, stances, origin, index)
+    ]
+    if drawings:
+        found.append(Section(f"Net joint torques, {who}", drawings=tuple(drawings)))
+    if (folder / "strengths.csv").is_file():
+        rows = read_rows(folder / "strengths.csv", _STRENGTHS)
+        found.append(Section(f"Muscle strengths, {who}", tables=(_strength_table(rows),)))
+    if (folder / "residuals.csv").is_file():
+        rows = read_rows(folder / "residuals.csv", _RESIDUALS)
+        found.append(Section(f"Pelvis residuals, {who}", tables=(_residual_table(rows),)))
+    notes = [str(note) for note in origin.get("notes") or ()]
+    versions = ", ".join(f"{n} {v}" for n, v in (origin.get("versions") or {}).items())
+    lines = (*(f"{note}." for note in notes), *([f"Versions: {versions}."] if versions else []))
+    found.append(Section(f"What was assumed, {who}", tuple(lines)))
+    return found
+
+
+def _stance_table(rows: Rows) -> Table:
+    """Return how many stances were recorded and measured, and why the others were not."""
+    found = []
+    for condition in dict.fromkeys(row["condition"] for row in rows):
+        for side in SIDES:
+            own = [r for r in rows if (r["condition"], r["side"]) == (condition, side)]
+            known = [row for row in own if row["measured"] == "yes"]
+            why = Counter(row["reason"] for row in own if row["measured"] != "yes")
+            reasons = "; ".join(f"{count}: {reason}" for reason, count in why.most_common())
+            trials = len({row["trial"] for row in own})
+            cells = (condition, side, str(trials), str(len(own)), str(len(known)), reasons or "-")
+            found.append(Row(cells))
+    head = ("condition", "side", "trials", "stances", "measured", "why not measured")
+    return Table(head, tuple(found), columns="wwnnnp")
+
+
+def _torques(
+    folder: Path, condition: Condition, stances: Rows, origin: Mapping[str, Any], index: int
+) -> list[Drawing]:
+    """Return the figure of the torques of a condition, none without measured strides."""
+    try:
+        trials = read_trials(folder, condition, stances)
+    except (ValueError, KeyError) as problem:
+        raise DataError(f"cannot be used: {problem}", where=str(folder / condition)) from None
+    if not any(_measured(trial) for trial in trials):
+        return []
+    title = (
+        f"Net joint torques [N m/kg] over the gait cycle, {condition}: {origin['patient']}, mean "
+        "and range of the measured strides"
+    )
+    name = f"torques-{index}-{condition}"
+    return [torque_drawing(trials, float(origin["body_mass"]), name, title)]
+
+
+def _measured(trial: StudyTrial) -> bool:
+    """Return whether some complete gait cycle begins with a measured stance."""
+    known = {(s.stance.side, s.stance.strike) for s in trial.stances if s.measured}
+    return trial.tau is not None and any((c.side, c.start) in known for c in trial.cycles)
+
+
+def _strength_table(rows: Rows) -> Table:
+    """Return the maximum isometric torques beside those of the patient's file."""
+    found = tuple(
+        Row(
+            (
+                _muscles(row["generator"]),
+                number(row, "strength", ".1f"),
+                number(row, "patient file", ".1f"),
+                number(row, "deviation", "+.0f"),
+                row["stances"] or "-",
+                _span(row),
+                row["remark"] or "-",
+            )
+        )
+        for row in rows
+    )
+    head = ("muscle group", "strength [N m]", "patient's file [N m]", "deviation [%]", "stances",
+            "single stances [N m]", "remark")  # fmt: skip
+    return Table(head, found, columns="wnnnnnp")
+
+
+def _muscles(generator: str) -> str:
+    """Return "hip extension, right" for "hip_extension_r"."""
+    for side in SIDES:
+        if generator.endswith(f"_{SUFFIX[side]}"):
+            return f"{generator[:-2].replace('_', ' ')}, {side}"
+    return generator.replace("_", " ")
+
+
+def _span(row: Mapping[str, str]) -> str:
+    """Return what single stances give, "-" without any."""
+    ends = [number(row, f"{end} of single stances", ".1f") for end in ("least", "largest")]
+    return "-" if "-" in ends else " to ".join(ends)
+
+
+def _residual_table(rows: Rows) -> Table:
+    """Return what inverse dynamics leaves over, means over trials."""
+    found = tuple(
+        Row(
+            (
+                f"{row['condition']}, {row['part']}, {row['trial']}",
+                number(row, "forward mean", ".1f"),
+                number(row, "up mean", ".1f"),
+                number(row, "moment mean", ".2f"),
+            )
+        )
+        for row in rows
+        if row["trial"].endswith("over trials")
+    )
+    return Table(("", "forward [N]", "up [N]", "moment [N m]"), found)

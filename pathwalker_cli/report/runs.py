@@ -1,0 +1,107 @@
+"""The runs of a report, read and compared with the recordings of their patient."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+
+from pathwalker_cli.config import study_patient
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
+from pathwalker_cli.evaluation.run import gait_of_run
+from pathwalker_cli.output.run_folder import Run, load_run
+from pathwalker_cli.output.run_metrics import sha256
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.studies.verdict import Verdict, verdict_of_metrics
+
+__all__ = ["ReportRun", "changes_of", "read_runs"]
+
+
+@dataclass(frozen=True)
+class ReportRun:
+    """A converged run.
+
+    Args:
+        label: What to call it: its condition, or its folder where several share that.
+        run: Its folder as it was read.
+        patient: The patient as the file says today.
+        evaluation: Its gait beside the recordings.
+        verdict: What is known about its springs; None where nothing was judged.
+    """
+
+    label: str
+    run: Run
+    patient: Patient
+    evaluation: Evaluation
+    verdict: Verdict | None
+
+    @property
+    def worn(self) -> bool:
+        """Whether orthoses are worn."""
+        return self.run.config.condition == "orthosis"
+
+    @property
+    def date(self) -> str:
+        """When it was solved, as far as the run tells."""
+        told = self.run.metrics.get("date")
+        if told:
+            return str(told)
+        written = (self.run.folder / "metrics.json").stat().st_mtime
+        return f"not kept; files of {datetime.fromtimestamp(written, UTC).date().isoformat()}"
+
+    @cached_property
+    def patient_changed(self) -> bool:
+        """Whether the patient's file is another one than at the time of the run."""
+        then = self.run.metrics.get("input_hashes", {}).get("patient")
+        return then is not None and self.patient.source is not None and (
+            sha256(self.patient.content) != then
+        )  # fmt: skip
+
+
+def read_runs(folders: Sequence[Path]) -> tuple[ReportRun, ...]:
+    """Read runs of one patient, barefoot ones first.
+
+    Raises:
+        DataError: If one did not converge, cannot be read, or they are of different patients.
+    """
+    gaits = [gait_of_run(folder) for folder in folders]
+    runs = [load_run(folder) for folder in folders]
+    ids = [gait.walker.patient.id for gait in gaits]
+    for folder, each in zip(folders, ids, strict=True):
+        if each != ids[0]:
+            raise DataError(
+                f"is a run of patient {each}, but {folders[0]} is one of {ids[0]}",
+                where=str(folder),
+                allowed="runs of one patient",
+                mend="write a report for each, or name the folder of a batch",
+            )
+    conditions = [run.config.condition for run in runs]
+    unique = len(set(conditions)) == len(conditions)
+    names = conditions if unique else _labels(folders)
+    found = [
+        ReportRun(
+            name, run, study_patient(run.config), evaluate_gait(gait),
+            verdict_of_metrics(run.metrics),
+        )
+        for name, run, gait in zip(names, runs, gaits, strict=True)
+    ]  # fmt: skip
+    return tuple(sorted(found, key=lambda each: each.worn))
+
+
+def _labels(folders: Sequence[Path]) -> list[str]:
+    """Return names of folders; longer ones where they would be the same."""
+    names = [folder.resolve().name for folder in folders]
+    return [
+        name if names.count(name) == 1 else f"{folder.resolve().parent.name}/{name}"
+        for name, folder in zip(names, folders, strict=True)
+    ]
+
+
+def changes_of(runs: Sequence[ReportRun]) -> tuple[Change, ...]:
+    """Return the changes from the one barefoot run to the one with orthoses, if there are both."""
+    if [run.worn for run in runs] != [False, True]:
+        return ()
+    return gait_changes(runs[0].evaluation, runs[1].evaluation)

@@ -1,0 +1,110 @@
+"""The springs that a report recommends, and how sure they are."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.report.content import Fact, Row, Section, Table
+from pathwalker_cli.report.runs import ReportRun
+from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, Verdict
+from pathwalker_cli.studies.verdict_text import per_degree, reservations, stop_text
+
+__all__ = ["recommended", "spring_section", "verdict_words"]
+
+_HEAD: Final = (
+    "spring", "take", "[N m/rad]", "[N m/deg]", "least effort [N m/rad]",
+    f"cost within {100 * SHARE:g} % [N m/rad]",
+    f"cost within {100 * SHARE:g} % [N m/deg]", "verdict",
+)  # fmt: skip
+
+_NOT_JUDGED: Final = (
+    "The springs of this run were not judged (verdict: false, a quick check, or no free spring): "
+    "the table shows those of least effort only."
+)
+
+
+def spring_section(run: ReportRun) -> Section:
+    """Return the springs of a run with orthoses: real ones to take, region, verdict."""
+    verdict = run.verdict
+    rows = tuple(_row(run, name) for name in STIFFNESSES)
+    notes = [
+        "K_D resists dorsiflexion, K_P plantarflexion; the range is that in which the cost stays "
+        f"within {100 * SHARE:g} % of the best, all else optimal"
+    ]
+    lines: tuple[str, ...] = ()
+    facts: tuple[Fact, ...] = ()
+    if verdict is None:
+        lines = (_NOT_JUDGED,)
+    else:
+        facts = tuple(_facts(verdict))
+    table = Table(_HEAD, rows, notes=tuple(notes), columns="wwnnnnnp")
+    return Section(f"Recommended springs, {run.label}", lines, facts, (table,))
+
+
+def recommended(run: ReportRun) -> dict[str, float]:
+    """Return the springs to take [N m/rad]: real ones where the run chose among them."""
+    if run.verdict is not None and run.verdict.snapped is not None:
+        chosen = run.verdict.snapped.stiffness
+    else:
+        chosen = {}
+    return {name: chosen.get(name, _identified(run, name)) for name in STIFFNESSES}
+
+
+def verdict_words(spring: SpringVerdict) -> str:
+    """Return in words how sure a spring is."""
+    if not spring.limit:
+        return spring.determined
+    end = {"upper": "stiffest", "lower": "softest"}[spring.limit]
+    return f"{spring.determined}; at the limit of what can be bought ({end})"
+
+
+def _identified(run: ReportRun, name: str) -> float:
+    return float(run.run.metrics[name])
+
+
+def _row(run: ReportRun, name: str) -> Row:
+    """Return the row of one spring."""
+    take, found, verdict = recommended(run)[name], _identified(run, name), run.verdict
+    spring = next((s for s in verdict.springs if s.spring == name), None) if verdict else None
+    snapped = verdict.snapped.names.get(name, "") if verdict and verdict.snapped else ""
+    region = ("-", "-")
+    words = "not judged" if verdict is None else "prescribed, not identified"
+    if spring is not None:
+        low, high = spring.region
+        region = f"{low:.1f} to {high:.1f}", f"{per_degree(low):.2f} to {per_degree(high):.2f}"
+        words = verdict_words(spring)
+    label = measure_of(name).label
+    cells = (label, snapped or "-", f"{take:.1f}", f"{per_degree(take):.2f}", f"{found:.1f}",
+             *region, words)  # fmt: skip
+    return Row(cells, "good" if snapped else "")
+
+
+def _facts(verdict: Verdict) -> list[Fact]:
+    """Return what the table has no room for."""
+    snapped = verdict.snapped
+    if snapped is None:
+        real = "the patient's file lists none that can be bought (orthosis.springs)"
+    elif snapped.status == "converged":
+        real = (
+            f"solved again with these: cost {100 * snapped.rise:+.2g} %, "
+            f"{snapped.walking_speed:.3f} m/s"
+        )
+    else:
+        real = f"estimated cost {100 * snapped.rise:+.2g} % (solving it: {snapped.status})"
+    if verdict.starts > 1:
+        others = f"{len(verdict.optima) - 1} of {verdict.starts - 1} other starts end within 5 %"
+    else:
+        others = "not searched for (starts: 8 does)"
+    facts = [Fact("Real springs", real), Fact("Other optima", others)]
+    doubts = [
+        f"{measure_of(s.spring).label}: {'; '.join(found)}"
+        for s in verdict.springs
+        if (found := list(reservations(s)))
+    ]
+    if doubts:
+        facts.append(Fact("Limits and doubts", ". ".join(doubts)))
+    reached = [stop_text(stop) for stop in verdict.stops if stop.excess > 0.0]
+    facts.append(Fact("Hard stops", "; ".join(reached) or "none is reached"))
+    return facts
