@@ -149,6 +149,7 @@ ORIGIN: Final = {
     "warm_start": "folder of the earlier run, or `null`",
     "dynamics_backend": "`pinocchio.casadi`, `compiled` or `direct`",
     "published_model": "whether the published model's misplaced right forearm was kept",
+    "date": "day on which the run was made",
     "versions": "PathWalker, Python and numerical libraries",
     "input_hashes": "SHA-256 of resolved config, patient file, the run's own `patient.yaml` and earlier motion",
     "motion_hash": "SHA-256 of `motion.npz`",
