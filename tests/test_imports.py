@@ -28,7 +28,7 @@ LAYERS = (
     {"output"},
     {"evaluation"},
     {"studies"},
-    {"reproduce"},
+    {"reproduce", "animation"},
     {"commands"},
     {"cli"},
 )
@@ -39,8 +39,10 @@ APART = ({"ocp", "inverse"},)
 
 CONFINED = {
     "casadi": ("model", "ocp", "commands.doctor"),
-    "pinocchio": ("model", "ocp", "inverse", "output.body"),
+    "pinocchio": ("model", "ocp", "inverse", "output.body", "animation.viewer"),
+    "jinja2": ("animation.html",),
     "matplotlib": (
+        "animation.film",
         "output.figures",
         "output.recorded_figures",
         "evaluation.figures",

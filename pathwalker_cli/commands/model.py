@@ -34,6 +34,7 @@ def model_command(patient: str, condition: str, out: Path | None, published: boo
 
     PATIENT is a shipped id, a folder with patient.yaml, or a YAML file.
     """
+    from pathwalker_cli.io.atomic import output_path
     from pathwalker_cli.model.anthropometry import segments
     from pathwalker_cli.model.urdf import urdf_text
     from pathwalker_cli.patient import load_patient
@@ -43,26 +44,10 @@ def model_command(patient: str, condition: str, out: Path | None, published: boo
     if out is None:
         click.echo(text, nl=False)
     else:
-        _write(out, text)
+        with output_path(out) as file:
+            file.write_text(text, encoding="utf-8", newline="")
     for line in _summary(who, worn, segments(who, worn, published)):
         click.echo(line, err=True)
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file in one stroke."""
-    from pathwalker_cli.errors import DataError
-    from pathwalker_cli.io.atomic import atomic_open
-
-    if path.is_dir():
-        raise DataError("is a folder", where=str(path), mend="name a file in it")
-    try:
-        with atomic_open(path) as file:
-            file.write(text)
-    except OSError as problem:
-        reason = problem.strerror or str(problem)
-        raise DataError(
-            f"cannot be written: {reason}", where=str(path), mend="choose another file"
-        ) from None
 
 
 def _summary(patient: Patient, condition: Condition, parts: tuple[Segment, ...]) -> list[str]:

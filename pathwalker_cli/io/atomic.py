@@ -9,7 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, Literal
 
-__all__ = ["atomic_open", "atomic_path"]
+from pathwalker_cli.errors import DataError
+
+__all__ = ["atomic_open", "atomic_path", "check_output", "output_path"]
 
 
 @contextmanager
@@ -41,3 +43,37 @@ def atomic_open(path: str | Path, mode: Literal["w", "wb"] = "w") -> Iterator[IO
     text = {"encoding": "utf-8", "newline": ""} if mode == "w" else {}
     with atomic_path(path) as temporary, temporary.open(mode, **text) as file:  # type: ignore[call-overload]
         yield file
+
+
+def check_output(path: str | Path) -> None:
+    """Refuse a place where no file can be put, before the work that would fill it.
+
+    Raises:
+        DataError: If a folder stands there, or its folder is missing or must not be written.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise DataError("is a folder", where=str(path), mend="name a file in it")
+    if not target.parent.is_dir():
+        raise DataError("no such folder", where=str(target.parent), mend="make it first")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        mend = "choose another folder"
+        raise DataError("cannot be written", where=str(target.parent), mend=mend)
+
+
+@contextmanager
+def output_path(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path as `atomic_path` does, for a file that the user named.
+
+    Raises:
+        DataError: If it cannot be written.
+    """
+    check_output(path)
+    try:
+        with atomic_path(path) as temporary:
+            yield temporary
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise DataError(
+            f"cannot be written: {reason}", where=str(path), mend="choose another file"
+        ) from None
