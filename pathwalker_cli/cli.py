@@ -80,6 +80,16 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "tradeoff_command",
         "Find what walking faster costs, and which springs suit which speed.",
     ),
+    "animate": (
+        "pathwalker_cli.commands.animate",
+        "animate_command",
+        "Draw the walker of one or two runs, moving: a page for the browser, a GIF or an MP4.",
+    ),
+    "view": (
+        "pathwalker_cli.commands.view",
+        "view_command",
+        "Show the stride of a run in 3D.",
+    ),
     "model": (
         "pathwalker_cli.commands.model",
         "model_command",

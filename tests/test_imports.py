@@ -28,7 +28,7 @@ LAYERS = (
     {"output"},
     {"evaluation", "verification"},
     {"studies"},
-    {"reproduce", "report"},
+    {"reproduce", "report", "animation"},
     {"commands"},
     {"cli"},
 )
@@ -39,9 +39,10 @@ APART = ({"ocp", "inverse"},)
 
 CONFINED = {
     "casadi": ("model", "ocp", "commands.doctor"),
-    "pinocchio": ("model", "ocp", "inverse", "output.body"),
-    "jinja2": ("report.html",),
+    "pinocchio": ("model", "ocp", "inverse", "output.body", "animation.viewer"),
+    "jinja2": ("animation.html", "report.html"),
     "matplotlib": (
+        "animation.film",
         "output.figures",
         "output.recorded_figures",
         "evaluation.ankle_panels",

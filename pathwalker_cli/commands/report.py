@@ -28,12 +28,12 @@ def report_command(runs: tuple[Path, ...], out: Path) -> None:
     is refused, except in a cohort, where it is shown as failed.
     """
     from pathwalker_cli.errors import DataError
-    from pathwalker_cli.io.atomic import check_file, write_text
+    from pathwalker_cli.io.atomic import check_output, write_text
     from pathwalker_cli.report.build import page_of
     from pathwalker_cli.report.html import page_html
 
     if out.suffix not in (".html", ".htm"):
         raise DataError("is no name of a page", where=f"--out {out}", allowed="FILE.html")
-    check_file(out)
+    check_output(out)
     write_text(out, page_html(page_of(runs)))
     click.echo(f"Written to {out}")

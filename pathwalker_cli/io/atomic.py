@@ -11,7 +11,7 @@ from typing import IO, Any, Literal
 
 from pathwalker_cli.errors import DataError
 
-__all__ = ["atomic_open", "atomic_path", "check_file", "write_text"]
+__all__ = ["atomic_open", "atomic_path", "check_output", "output_path", "write_text"]
 
 
 @contextmanager
@@ -45,30 +45,45 @@ def atomic_open(path: str | Path, mode: Literal["w", "wb"] = "w") -> Iterator[IO
         yield file
 
 
-def check_file(path: Path) -> None:
-    """Refuse a place at which no file can be written.
+def check_output(path: str | Path) -> None:
+    """Refuse a place where no file can be put, before the work that would fill it.
 
     Raises:
-        DataError: If it is a folder, or would be in none.
+        DataError: If a folder stands there, or its folder is missing or must not be written.
     """
-    if path.is_dir():
+    target = Path(path)
+    if target.is_dir():
         raise DataError("is a folder", where=str(path), mend="name a file in it")
-    if not path.absolute().parent.is_dir():
-        raise DataError("no such folder", where=str(path.parent), mend="make it first")
+    if not target.parent.is_dir():
+        raise DataError("no such folder", where=str(target.parent), mend="make it first")
+    if not os.access(target.parent, os.W_OK | os.X_OK):
+        mend = "choose another folder"
+        raise DataError("cannot be written", where=str(target.parent), mend=mend)
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a file that a user asked for in one stroke.
+@contextmanager
+def output_path(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path as `atomic_path` does, for a file that the user named.
 
     Raises:
         DataError: If it cannot be written.
     """
-    check_file(path)
+    check_output(path)
     try:
-        with atomic_open(path) as file:
-            file.write(text)
+        with atomic_path(path) as temporary:
+            yield temporary
     except OSError as problem:
         reason = problem.strerror or str(problem)
         raise DataError(
             f"cannot be written: {reason}", where=str(path), mend="choose another file"
         ) from None
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file that the user named in one stroke.
+
+    Raises:
+        DataError: If it cannot be written.
+    """
+    with output_path(path) as file:
+        file.write_text(text, encoding="utf-8", newline="")

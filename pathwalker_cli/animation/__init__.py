@@ -1,0 +1,1 @@
+"""Animations of the walking model: files for people, and a view in 3D."""

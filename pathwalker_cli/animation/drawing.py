@@ -1,0 +1,290 @@
+"""The drawn walker: shapes that hang on points of the body, for every kind of animation."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final, Literal
+
+import numpy as np
+
+from pathwalker_cli.animation.frames import GaitFrames
+from pathwalker_cli.conventions import GENERATORS, SUFFIX, Side
+from pathwalker_cli.output.cycle import BOTH_SIDES
+from pathwalker_cli.output.figures.style import FORCE_LENGTH
+
+__all__ = ["Drawing", "Shape", "View", "common_view", "drawing", "force_scale", "words"]
+
+Kind = Literal["leg", "foot", "trunk", "head", "muscle", "shell", "spring"]
+
+_LINE: Final = np.array([[0.0, 0.0], [1.0, 0.0]])
+
+_MUSCLE_PLACES: Final = {
+    "hip_extension": ("hip", "knee", 0.03, 0.45, -1),
+    "hip_flexion": ("hip", "knee", 0.03, 0.45, 1),
+    "knee_extension": ("hip", "knee", 0.55, 0.97, 1),
+    "knee_flexion": ("hip", "knee", 0.55, 0.97, -1),
+    "ankle_extension": ("knee", "ankle", 0.08, 0.5, -1),
+    "ankle_flexion": ("knee", "ankle", 0.08, 0.5, 1),
+    "lumbar_extension": ("lumbar", "neck", 0.03, 0.4, -1),
+    "lumbar_flexion": ("lumbar", "neck", 0.03, 0.4, 1),
+}
+"""Segment from point to point, beginning and end on it, and its side: + is left of the way."""
+
+_MUSCLE_GAP: Final = 0.012
+_MUSCLE_WIDTH: Final = 0.026
+"""Distance of a muscle from the segment and its greatest width [m]."""
+
+_SHELL: Final = (0.54, 0.86, 0.03)
+"""Shell at the shank: beginning and end as shares of the shank, half its depth [m]."""
+_SOLE: Final = (-0.08, 1.0, 0.016, 0.05)
+"""Shell under the foot: rear and front from heel to toe, thickness and height of its cup [m]."""
+_COILS: Final = 5
+_COIL_WIDTH: Final = 0.024
+"""Zigzags of a drawn spring and their width [m]."""
+
+_SHAFT, _HEAD_WIDTH, _HEAD_LENGTH = 0.012, 0.036, 0.045
+"""Size of an arrow [m]; a short arrow has a shorter head."""
+
+_MARGIN: Final = 0.06
+"""Free space around the walker [m]."""
+_BELOW: Final = 0.11
+"""Height of the strip below the ground, where the distance stands [m]."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A line or an area between two points of the body.
+
+    Args:
+        kind: What it stands for.
+        start: Point where it begins.
+        end: Point where it ends.
+        outline: Corners, shape (k, 2): the share of the way from start to end, and the distance to
+            the left of that way [m].
+        closed: Whether it is an area.
+        side: Leg that it belongs to; None for the trunk.
+        generator: Position in `conventions.GENERATORS` of a muscle.
+    """
+
+    kind: Kind
+    start: str
+    end: str
+    outline: np.ndarray
+    closed: bool = False
+    side: Side | None = None
+    generator: int | None = None
+
+    def at(self, points: Mapping[str, np.ndarray], i: int) -> np.ndarray:
+        """Return its corners at instant i (forward, up) [m], shape (k, 2)."""
+        return _placed(self.outline, points[self.start][i], points[self.end][i])
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A stride with what is drawn of it.
+
+    Args:
+        frames: The stride.
+        points: Its points and those that shapes need besides [m], shape (n, 2) each.
+        shapes: What is drawn, from back to front.
+        arrows: Corners of the arrow of each ground force [m], shape (n, 7, 2); NaN without load.
+    """
+
+    frames: GaitFrames
+    points: Mapping[str, np.ndarray]
+    shapes: tuple[Shape, ...]
+    arrows: Mapping[Side, np.ndarray]
+
+
+@dataclass(frozen=True)
+class View:
+    """What is seen of the plane of walking, from an eye that moves on with the mean speed.
+
+    Args:
+        half_width: Distance from the middle to either edge [m].
+        bottom: Lower edge [m], negative: the ground is at 0.
+        top: Upper edge [m].
+    """
+
+    half_width: float
+    bottom: float
+    top: float
+
+
+def drawing(frames: GaitFrames) -> Drawing:
+    """Return what is drawn of a stride."""
+    worn = frames.condition == "orthosis"
+    points = dict(frames.points)
+    if worn:
+        points |= _spring_ends(frames.points)
+    left, right = (_leg(points, side, worn) for side in ("left", "right"))
+    return Drawing(
+        frames=frames,
+        points=points,
+        shapes=(*left, *_trunk(points), *right),
+        arrows={side: _arrows(frames, side) for side in BOTH_SIDES},
+    )
+
+
+def common_view(drawings: Sequence[Drawing]) -> View:
+    """Return a view that holds every instant of every stride; it is at least as wide as high."""
+    wide = top = 0.0
+    for each in drawings:
+        frames = each.frames
+        eye = (frames.middle + frames.cycle * frames.distance)[:, None]
+        placed = (*(p[:, None] for p in each.points.values()), *each.arrows.values())
+        wide = max(wide, *(float(np.nanmax(np.abs(p[..., 0] - eye))) for p in placed))
+        top = max(top, *(float(np.nanmax(p[..., 1])) for p in placed), _crown(frames))
+    top += _MARGIN
+    return View(max(wide + _MARGIN, (top + _BELOW) / 2), -_BELOW, top)
+
+
+def force_scale(frames: GaitFrames) -> float:
+    """Return the length of the arrow of one newton [m/N]."""
+    return FORCE_LENGTH * frames.pelvis_height / frames.weight
+
+
+def words(name: str) -> str:
+    """Return the name of a phase or a generator as words, e.g. "right toe, left heel"."""
+    name = re.sub(r"_r$", "_right", re.sub(r"_l$", "_left", name))
+    return re.sub(r"_(right|left)", r", \1", name).replace("_", " ")
+
+
+def _placed(outline: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Return corners on the way between two points [m], shape (k, 2)."""
+    way = end - start
+    left = np.array([-way[1], way[0]]) / np.linalg.norm(way)
+    return start + outline[:, :1] * way + outline[:, 1:] * left
+
+
+def _leg(points: Mapping[str, np.ndarray], side: Side, worn: bool) -> tuple[Shape, ...]:
+    """Return the shapes of a leg, from back to front."""
+    s = SUFFIX[side]
+    chain = ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}")
+    bones = [Shape("leg", a, b, _LINE, side=side) for a, b in pairwise(chain)]
+    foot = Shape("foot", f"heel_{s}", f"toe_{s}", _foot(points, s), closed=True, side=side)
+    orthosis = (
+        Shape("shell", f"knee_{s}", f"ankle_{s}", _shank_shell(), closed=True, side=side),
+        Shape("shell", f"heel_{s}", f"toe_{s}", _foot_shell(), closed=True, side=side),
+        Shape("spring", f"spring_top_{s}", f"spring_foot_{s}", _zigzag(), side=side),
+    )
+    muscles = _muscles(points, ("hip", "knee", "ankle"), f"_{s}", side)
+    return (foot, *bones, *(orthosis if worn else ()), *muscles)
+
+
+def _trunk(points: Mapping[str, np.ndarray]) -> tuple[Shape, ...]:
+    """Return trunk and head with the muscles of the trunk."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 33)[:-1]
+    radius = float(np.linalg.norm(points["head"][0] - points["neck"][0]))
+    circle = np.stack([1.0 + np.cos(turn), radius * np.sin(turn)], axis=1)
+    return (
+        Shape("trunk", "lumbar", "neck", _LINE),
+        Shape("head", "neck", "head", circle, closed=True),
+        *_muscles(points, ("lumbar",), "", None),
+    )
+
+
+def _muscles(
+    points: Mapping[str, np.ndarray], joints: Sequence[str], suffix: str, side: Side | None
+) -> tuple[Shape, ...]:
+    """Return the muscles of some joints as lenses beside the segments."""
+    shapes = []
+    for name, (start, end, first, last, sign) in _MUSCLE_PLACES.items():
+        if name.split("_")[0] in joints:
+            bulge = np.sin(np.linspace(0.0, np.pi, 11)) ** 0.8
+            along = np.linspace(first, last, 11)
+            near = np.stack([along, np.full(11, sign * _MUSCLE_GAP)], axis=1)
+            far = np.stack([along, sign * (_MUSCLE_GAP + _MUSCLE_WIDTH * bulge)], axis=1)
+            shapes.append(
+                Shape(
+                    "muscle",
+                    f"{start}{suffix}",
+                    f"{end}{suffix}",
+                    np.concatenate([near[[0, -1]], far[-2:0:-1]]),
+                    closed=True,
+                    side=side,
+                    generator=GENERATORS.index(f"{name}{suffix}"),
+                )
+            )
+    return tuple(shapes)
+
+
+def _foot(points: Mapping[str, np.ndarray], s: str) -> np.ndarray:
+    """Return the triangle of heel, toe and ankle of a rigid foot."""
+    heel, toe, ankle = (points[f"{name}_{s}"][0] for name in ("heel", "toe", "ankle"))
+    sole, length = toe - heel, float(np.linalg.norm(toe - heel))
+    left = np.array([-sole[1], sole[0]]) / length
+    return np.array(
+        [[0.0, 0.0], [1.0, 0.0], [(ankle - heel) @ sole / length**2, (ankle - heel) @ left]]
+    )
+
+
+def _shank_shell() -> np.ndarray:
+    """Return the shell around the shank."""
+    top, bottom, depth = _SHELL
+    return np.array([[top, depth], [bottom, depth], [bottom, -depth], [top, -depth]])
+
+
+def _foot_shell() -> np.ndarray:
+    """Return the shell under the foot with its cup behind the heel."""
+    rear, front, thickness, height = _SOLE
+    inner = rear + 0.1
+    return np.array(
+        [
+            [rear, 0.0],
+            [front, 0.0],
+            [front, thickness],
+            [inner, thickness],
+            [inner, height],
+            [rear, height],
+        ]
+    )
+
+
+def _zigzag() -> np.ndarray:
+    """Return a spring from end to end."""
+    share = np.linspace(0.15, 0.85, 2 * _COILS)
+    across = _COIL_WIDTH / 2 * np.where(np.arange(2 * _COILS) % 2, -1.0, 1.0)
+    coils = np.stack([share, across], axis=1)
+    return np.concatenate([[[0.0, 0.0], [0.1, 0.0]], coils, [[0.9, 0.0], [1.0, 0.0]]])
+
+
+def _spring_ends(points: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return where the springs hang on the shells, behind the ankles [m], shape (n, 2) each."""
+    ends = {}
+    for s in SUFFIX.values():
+        top = np.array([[_SHELL[1], -_SHELL[2]]])
+        foot = np.array([[_SOLE[0], _SOLE[3]]])
+        for name, corner, start, end in (
+            ("top", top, "knee", "ankle"),
+            ("foot", foot, "heel", "toe"),
+        ):
+            pairs = zip(points[f"{start}_{s}"], points[f"{end}_{s}"], strict=True)
+            ends[f"spring_{name}_{s}"] = np.array([_placed(corner, a, b)[0] for a, b in pairs])
+    return ends
+
+
+def _arrows(frames: GaitFrames, side: Side) -> np.ndarray:
+    """Return the arrow of the ground force at the centre of pressure, shape (n, 7, 2)."""
+    arrows = np.full((frames.count, 7, 2), np.nan)
+    scale = force_scale(frames)
+    for i, (x, force) in enumerate(zip(frames.pressure[side], frames.force[side], strict=True)):
+        if np.isfinite(x):
+            start = np.array([x, 0.0])
+            length = float(np.linalg.norm(scale * force))
+            neck = 1.0 - min(_HEAD_LENGTH / length, 0.6)
+            half = np.array([[0.0, 0.5], [neck, 0.5]]) * [1.0, _SHAFT]
+            barb = np.array([[neck, _HEAD_WIDTH / 2]])
+            upper = np.concatenate([half, barb])
+            outline = np.concatenate([upper, [[1.0, 0.0]], upper[::-1] * [1.0, -1.0]])
+            arrows[i] = _placed(outline, start, start + scale * force)
+    return arrows
+
+
+def _crown(frames: GaitFrames) -> float:
+    """Return the greatest height of the crown of the head [m]."""
+    head, neck = frames.points["head"], frames.points["neck"]
+    return float((head[:, 1] + np.linalg.norm(head - neck, axis=1)).max())

@@ -1,0 +1,144 @@
+"""The animation as one HTML page that needs neither network nor server."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+
+from pathwalker_cli.animation.drawing import (
+    Drawing,
+    Shape,
+    common_view,
+    drawing,
+    force_scale,
+    words,
+)
+from pathwalker_cli.animation.frames import GaitFrames
+from pathwalker_cli.animation.look import (
+    ACTIVATION_COLOURS,
+    CAVEAT,
+    DASHES,
+    SHELL_COLOUR,
+    SPRING_COLOUR,
+    arrow_look,
+    pace,
+    shape_look,
+    subtitle,
+)
+from pathwalker_cli.conventions import GENERATORS
+from pathwalker_cli.output.cycle import BOTH_SIDES
+from pathwalker_cli.output.figures.style import BODY_COLOUR, FORCE_COLOUR
+
+__all__ = ["RATE", "html_page"]
+
+RATE: Final = 100.0
+"""Instants of the page per second of gait [1/s]; between them the page interpolates."""
+
+
+def html_page(runs: Sequence[GaitFrames]) -> str:
+    """Return the page of one or two strides.
+
+    Names of runs come from folders: the template escapes them in text and data alike.
+    """
+    drawings = [drawing(frames) for frames in runs]
+    view = common_view(drawings)
+    return _template().render(
+        title=" and ".join(frames.name for frames in runs),
+        caveat=CAVEAT,
+        pace=pace(runs),
+        colours=ACTIVATION_COLOURS,
+        dashes=DASHES,
+        right=BODY_COLOUR["right"],
+        left=BODY_COLOUR["left"],
+        force=FORCE_COLOUR,
+        shell=SHELL_COLOUR,
+        spring=SPRING_COLOUR,
+        view=view,
+        panels=[_panel(each) for each in drawings],
+        worn=any(frames.condition == "orthosis" for frames in runs),
+        data={
+            "colours": ACTIVATION_COLOURS,
+            "half_width": view.half_width,
+            "runs": [_data(each) for each in drawings],
+        },
+    )
+
+
+@cache
+def _template() -> Template:
+    """Return the template of the page."""
+    environment = Environment(
+        loader=PackageLoader("pathwalker_cli.animation", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    # No spaces: the data of two strides is most of the page.
+    environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
+    return environment.get_template("page.html")
+
+
+def _panel(each: Drawing) -> dict[str, Any]:
+    """Return what the template draws of a stride."""
+    frames = each.frames
+    return {
+        "name": frames.name,
+        "subtitle": subtitle(frames),
+        "notes": frames.notes,
+        "weight": frames.weight,
+        "weight_length": force_scale(frames) * frames.weight,
+        "shapes": [asdict(shape_look(shape)) | {"title": _title(shape)} for shape in each.shapes],
+        "arrows": [
+            asdict(arrow_look(side)) | {"title": f"ground force, {side}"} for side in BOTH_SIDES
+        ],
+    }
+
+
+def _title(shape: Shape) -> str:
+    """Return what a shape stands for, in words."""
+    what = shape.kind if shape.generator is None else words(GENERATORS[shape.generator])
+    if shape.kind in ("leg", "foot"):
+        return f"{shape.side} {shape.kind}"
+    return f"orthosis, {what}, {shape.side}" if shape.kind in ("shell", "spring") else what
+
+
+def _data(each: Drawing) -> dict[str, Any]:
+    """Return what the script of the page needs of a stride."""
+    frames = each.frames
+    return {
+        "name": frames.name,
+        "duration": frames.duration,
+        "distance": frames.distance,
+        "middle": frames.middle,
+        "phases": [words(name) for name in frames.phase],
+        "points": {name: _rounded(xz, 4) for name, xz in each.points.items()},
+        "arrows": [_loaded(each.arrows[side]) for side in BOTH_SIDES],
+        "activation": _rounded(frames.activation, 3),
+        "shapes": [
+            {
+                "from": shape.start,
+                "to": shape.end,
+                "outline": _rounded(shape.outline, 4),
+                "closed": shape.closed,
+                "generator": shape.generator,
+            }
+            for shape in each.shapes
+        ],
+    }
+
+
+def _loaded(arrows: np.ndarray) -> list[Any]:
+    """Return arrows as lists, None where there is none."""
+    return [None if np.isnan(arrow).any() else _rounded(arrow, 4) for arrow in arrows]
+
+
+def _rounded(values: np.ndarray, digits: int) -> list[Any]:
+    """Return nested lists of rounded numbers."""
+    return list(np.round(values, digits).tolist())

@@ -1,0 +1,118 @@
+"""Colours, line widths and words of the drawn walker, the same in every kind of animation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from pathwalker_cli.animation.drawing import Shape
+from pathwalker_cli.animation.frames import GaitFrames
+from pathwalker_cli.conventions import Side
+from pathwalker_cli.output.figures.style import BODY_COLOUR, FORCE_COLOUR, LINE_COLOUR
+
+__all__ = [
+    "ACTIVATION_COLOURS",
+    "CAVEAT",
+    "DASHES",
+    "SHELL_COLOUR",
+    "SPRING_COLOUR",
+    "Look",
+    "arrow_look",
+    "pace",
+    "shape_look",
+    "subtitle",
+]
+
+ACTIVATION_COLOURS: Final = (
+    "#ffffe5",
+    "#fff7bc",
+    "#fee391",
+    "#fec44f",
+    "#fe9929",
+    "#ec7014",
+    "#cc4c02",
+    "#993404",
+    "#662506",
+)
+"""Activation from 0 to 1 in even steps: YlOrBr of ColorBrewer (Harrower and Brewer, 2003), which
+darkens all the way, so that it reads with any colour vision and in print."""
+
+DASHES: Final = (0.022, 0.014)
+"""Dash and gap of the left leg [m]; the right leg is solid."""
+
+CAVEAT: Final = (
+    "Motion of a walking model, not a recording. PathWalker is research software and no medical "
+    "device."
+)
+
+SHELL_COLOUR: Final = "#56B4E9"
+SPRING_COLOUR: Final = LINE_COLOUR["right"]
+"""Areas and lines of the orthosis."""
+_WIDTHS: Final = {
+    "leg": 0.014,
+    "foot": 0.008,
+    "trunk": 0.018,
+    "head": 0.01,
+    "muscle": 0.003,
+    "shell": 0.004,
+    "spring": 0.005,
+}
+"""Line width of each kind of shape [m]."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """How something is drawn.
+
+    Args:
+        stroke: Colour of the line.
+        width: Width of the line [m].
+        dashed: Whether the line is broken, as all of the left leg is.
+        fill: Colour of the area; "none" leaves it open.
+        opacity: Opacity of that colour.
+    """
+
+    stroke: str
+    width: float
+    dashed: bool
+    fill: str = "none"
+    opacity: float = 1.0
+
+
+def shape_look(shape: Shape) -> Look:
+    """Return the look of a shape; the colour of a muscle is that of activation 0."""
+    left = shape.side == "left"
+    stroke = BODY_COLOUR[shape.side or "right"]
+    width = _WIDTHS[shape.kind]
+    if shape.kind in ("shell", "spring"):
+        fill = SHELL_COLOUR if shape.kind == "shell" else "none"
+        return Look(SPRING_COLOUR, width, left and shape.kind == "shell", fill, 0.45)
+    fill = ACTIVATION_COLOURS[0] if shape.kind == "muscle" else "none"
+    return Look(stroke, width, left and shape.kind in ("leg", "foot"), fill)
+
+
+def arrow_look(side: Side) -> Look:
+    """Return the look of a ground force: filled on the right, hollow on the left."""
+    return Look(FORCE_COLOUR, 0.004, False, FORCE_COLOUR if side == "right" else "#ffffff")
+
+
+def subtitle(frames: GaitFrames) -> str:
+    """Return in one line who walks how fast."""
+    worn = "with orthoses" if frames.condition == "orthosis" else "barefoot"
+    return (
+        f"{frames.patient}, {worn} ({frames.problem}): {frames.walking_speed:.2f} m/s, "
+        f"stride {frames.distance:.2f} m in {frames.duration:.2f} s"
+    )
+
+
+def pace(runs: Sequence[GaitFrames]) -> str:
+    """Return how the clocks of two strides go together; nothing for one stride."""
+    if len(runs) < 2:
+        return ""
+    first, second = runs
+    ratio = second.duration / first.duration
+    return (
+        f"Both walkers are shown at the same share of the right gait cycle, at the pace of "
+        f"{first.name}: {second.name} moves {ratio:.2f} times as fast as it walks."
+    )

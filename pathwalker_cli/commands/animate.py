@@ -1,0 +1,99 @@
+"""The command `animate`: the walker of one or two runs, moving, as a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+__all__ = ["animate_command"]
+
+_PAGE, _FILMS = ".html", (".gif", ".mp4")
+
+
+@click.command("animate")
+@click.argument(
+    "runs", nargs=-1, required=True, metavar="RUN [RUN]", type=click.Path(path_type=Path)
+)
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="File: .html, .gif or .mp4.",
+)
+@click.option(
+    "--strides", type=click.IntRange(1, 100), metavar="N", help="Strides of a film; 1 if left out."
+)
+@click.option(
+    "--fps",
+    type=click.FloatRange(1.0, 60.0),
+    metavar="RATE",
+    help="Pictures per second of a film; 25 if left out.",
+)
+@click.option(
+    "--slow",
+    type=click.FloatRange(0.1, 100.0),
+    metavar="FACTOR",
+    help="How many times as long as the walk a film takes; 1 if left out.",
+)
+def animate_command(
+    runs: tuple[Path, ...], out: Path, strides: int | None, fps: float | None, slow: float | None
+) -> None:
+    """Draw the walker of one run, or of two side by side, as it walks.
+
+    An .html file plays in any browser without a network, at full, half or quarter speed; a .gif or
+    .mp4 is a film. MP4 needs ffmpeg: that of the system, or pip install imageio-ffmpeg. Body,
+    ground forces, orthosis and muscle activations are drawn. A run that did not converge is
+    refused.
+    """
+    _check(runs, out, {"--strides": strides, "--fps": fps, "--slow": slow})
+    if out.suffix.lower() == _PAGE:
+        _page(runs, out)
+    else:
+        _film(runs, out, strides or 1, fps or 25.0, slow or 1.0)
+    click.echo(f"Written to {out}")
+
+
+def _check(runs: tuple[Path, ...], out: Path, options: dict[str, float | None]) -> None:
+    """Refuse what no animation can be made of, before anything is computed."""
+    from pathwalker_cli.errors import DataError
+    from pathwalker_cli.io.atomic import check_output
+
+    if len(runs) > 2:
+        raise DataError(f"{len(runs)} runs are named", where="animate", allowed="one or two runs")
+    if out.suffix.lower() not in (_PAGE, *_FILMS):
+        raise DataError(
+            "is no kind of animation", where=str(out), allowed=", ".join((_PAGE, *_FILMS))
+        )
+    given = [name for name, value in options.items() if value is not None]
+    if given and out.suffix.lower() == _PAGE:
+        raise DataError(
+            "is about films only; a page has its own speed and goes on until it is paused",
+            where=given[0],
+            allowed="with " + " and ".join(_FILMS),
+            mend=f"leave {given[0]} out",
+        )
+    check_output(out)
+
+
+def _page(runs: tuple[Path, ...], out: Path) -> None:
+    """Write a page."""
+    from pathwalker_cli.animation.frames import run_frames
+    from pathwalker_cli.animation.html import RATE, html_page
+    from pathwalker_cli.io.atomic import output_path
+
+    page = html_page(run_frames(runs, RATE))
+    with output_path(out) as file:
+        file.write_text(page, encoding="utf-8", newline="")
+
+
+def _film(runs: tuple[Path, ...], out: Path, strides: int, fps: float, slow: float) -> None:
+    """Write a film."""
+    from pathwalker_cli.animation.film import film_rate, write_film
+    from pathwalker_cli.animation.frames import run_frames
+
+    rate = film_rate(out, fps)
+    frames = run_frames(runs, rate * slow)
+    write_film(out, frames, strides, rate)
