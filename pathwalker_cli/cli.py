@@ -45,6 +45,11 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "evaluate_command",
         "Compare predicted gait with the recordings of the patient.",
     ),
+    "compare": (
+        "pathwalker_cli.commands.compare",
+        "compare_command",
+        "Compare the metrics of runs, with differences and figures.",
+    ),
     "report": (
         "pathwalker_cli.commands.report",
         "report_command",

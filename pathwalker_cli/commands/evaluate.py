@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,9 +36,10 @@ def evaluate_command(
     """
     from pathwalker_cli.evaluation.evaluate import evaluate_gait
     from pathwalker_cli.evaluation.files import evaluation_content
+    from pathwalker_cli.evaluation.run import gaits_of_runs
     from pathwalker_cli.io.json_file import json_text
 
-    gaits = _gaits(runs)
+    gaits = gaits_of_runs(runs)
     trials = _trials(gaits, trial)
     evaluations = [evaluate_gait(gait, name) for gait, name in zip(gaits, trials, strict=True)]
     changes = _changes(evaluations)
@@ -51,24 +50,6 @@ def evaluate_command(
         click.echo(json_text(content), nl=False)
     else:
         _report(evaluations, changes, out)
-
-
-def _gaits(runs: Sequence[Path]) -> list[Gait]:
-    """Return the gaits of the runs under names that differ."""
-    from pathwalker_cli.errors import DataError
-    from pathwalker_cli.evaluation.run import gait_of_run
-
-    places = [folder.resolve() for folder in runs]
-    for place, folder in zip(places, runs, strict=True):
-        if places.count(place) > 1:
-            raise DataError("is named twice", where=str(folder), allowed="each run once")
-    gaits: list[Gait] = []
-    for folder in runs:
-        gait = gait_of_run(folder)
-        known = {each.name for each in gaits}
-        names = (gait.name if n == 1 else f"{gait.name}-{n}" for n in count(1))
-        gaits.append(replace(gait, name=next(name for name in names if name not in known)))
-    return gaits
 
 
 def _trials(gaits: Sequence[Gait], trial: str | None) -> list[str | None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -174,7 +175,7 @@ def save_overlays(shown: Sequence[Trace], folder: str | Path) -> tuple[str, ...]
         "activations": ACTIVATIONS,
     }
     makers: dict[str, Callable[[], Figure]] = {
-        name: lambda known=known: cycle_pairs(known, shown, head)
+        name: partial(cycle_pairs, known, shown, head)
         for name, curves in groups.items()
         if (known := known_curves(curves, shown))
     }

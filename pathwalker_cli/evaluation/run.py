@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +18,26 @@ from pathwalker_cli.ocp.series import GaitSeries, gait_series
 from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.output.run_folder import load_run
 
-__all__ = ["gait_of_run", "gait_of_series"]
+__all__ = ["gait_of_run", "gait_of_series", "gaits_of_runs"]
+
+
+def gaits_of_runs(folders: Sequence[Path]) -> tuple[Gait, ...]:
+    """Return the gaits of several runs under names that differ.
+
+    Raises:
+        DataError: If a run is named twice or cannot be used.
+    """
+    places = [folder.resolve() for folder in folders]
+    for place, folder in zip(places, folders, strict=True):
+        if places.count(place) > 1:
+            raise DataError("is named twice", where=str(folder), allowed="each run once")
+    gaits: list[Gait] = []
+    for folder in folders:
+        gait = gait_of_run(folder)
+        known = {each.name for each in gaits}
+        names = (gait.name if n == 1 else f"{gait.name}-{n}" for n in count(1))
+        gaits.append(replace(gait, name=next(name for name in names if name not in known)))
+    return tuple(gaits)
 
 
 def gait_of_run(folder: str | Path) -> Gait:

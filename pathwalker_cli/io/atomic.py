@@ -54,7 +54,8 @@ def check_file(path: Path) -> None:
     if path.is_dir():
         raise DataError("is a folder", where=str(path), mend="name a file in it")
     if not path.absolute().parent.is_dir():
-        raise DataError("no such folder", where=str(path.parent), mend="make it first")
+        what = f"cannot be written: there is no folder {path.parent}"
+        raise DataError(what, where=str(path), mend="make it first, or choose another file")
 
 
 def write_text(path: Path, text: str) -> None:

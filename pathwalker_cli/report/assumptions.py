@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.ocp.verify import ActiveBound
 from pathwalker_cli.output.solve_text import bound_line, interesting, source_lines
+from pathwalker_cli.report.config_values import changed_values
 from pathwalker_cli.report.content import Section, fact_table
 from pathwalker_cli.report.runs import ReportRun
 
-__all__ = ["assumption_section", "config_differences", "flat_config"]
+__all__ = ["assumption_section"]
 
 _METHODS: Final = {
     "collocation": "direct collocation",
@@ -28,25 +28,6 @@ def assumption_section(runs: Sequence[ReportRun]) -> Section:
     rows = tuple((label, *(column.get(label, "-") for column in columns)) for label in labels)
     head = ("", *(run.label for run in runs))
     return Section("What was assumed, and what was reached", tables=(fact_table(rows, head),))
-
-
-def config_differences(config: StudyConfig) -> dict[str, str]:
-    """Return the keys of a config whose values are not the defaults of its problem."""
-    bare = flat_config(StudyConfig(problem=config.problem, patient=config.patient))
-    return {key: text for key, text in flat_config(config).items() if bare.get(key) != text}
-
-
-def flat_config(config: StudyConfig) -> dict[str, str]:
-    """Return every value of a config as text by dotted key."""
-    return dict(_flat("", config.model_dump(mode="json")))
-
-
-def _flat(prefix: str, content: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for key, value in content.items():
-        if isinstance(value, Mapping) and value:
-            yield from _flat(f"{prefix}{key}.", value)
-        else:
-            yield f"{prefix}{key}", str(value)
 
 
 def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
@@ -110,7 +91,7 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
     yield "Versions", ", ".join(f"{name} {number}" for name, number in versions.items())
     hashes = metrics.get("input_hashes") or {}
     yield "Inputs", ", ".join(f"{name} {str(h)[:_HASH]}" for name, h in hashes.items())
-    changed = config_differences(config)
+    changed = changed_values(config)
     yield "Config", "; ".join(f"{k} = {v}" for k, v in changed.items()) or "all defaults"
 
 

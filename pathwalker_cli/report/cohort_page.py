@@ -9,10 +9,12 @@ from typing import Final
 from pathwalker_cli.conventions import SIDES, to_degrees
 from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
 from pathwalker_cli.report.csv_table import number, read_rows
-from pathwalker_cli.studies.batch.ledger import TABLE
-from pathwalker_cli.studies.batch.table import CONVERGED, PENDING
+from pathwalker_cli.studies.batch.ledger import CASES, TABLE
+from pathwalker_cli.studies.batch.table import CONVERGED, PENDING, read_metrics
 
 __all__ = ["cohort_page"]
+
+Rows = Sequence[Mapping[str, str]]
 
 _COLUMNS: Final = ("case", "patient", "problem", "status")
 _HEAD: Final = (
@@ -39,10 +41,11 @@ def cohort_page(folders: Sequence[Path]) -> Page:
     )
     answer = f"{counts['Converged']} of {len(rows)} cases of {len(patients)} patients converged."
     sections = tuple(_section(folder, own) for folder, own in tables.items())
-    return Page("Cohort", facts, answer, tuple(_warnings(counts)), sections)
+    warnings = [*_warnings(counts), *_quick_checks(tables)]
+    return Page("Cohort", facts, answer, tuple(warnings), sections)
 
 
-def _counts(rows: Sequence[Mapping[str, str]]) -> dict[str, int]:
+def _counts(rows: Rows) -> dict[str, int]:
     """Return how many cases converged, failed and wait."""
     states = [row["status"] for row in rows]
     done, waiting = states.count(CONVERGED), states.count(PENDING)
@@ -58,7 +61,20 @@ def _warnings(counts: Mapping[str, int]) -> list[str]:
     return found
 
 
-def _section(folder: Path, rows: Sequence[Mapping[str, str]]) -> Section:
+def _quick_checks(tables: Mapping[Path, Rows]) -> list[str]:
+    """Return a warning if cases are quick checks."""
+    found = [
+        metrics
+        for folder, rows in tables.items()
+        for row in rows
+        if (metrics := read_metrics(folder / CASES / row["case"])) and metrics.get("smoke")
+    ]
+    if not found:
+        return []
+    return [f"{len(found)} cases are quick checks on coarse meshes: numbers for orientation only"]
+
+
+def _section(folder: Path, rows: Rows) -> Section:
     """Return the table of a batch."""
     notes = (
         "r, l: right, left; springs are those of least effort, K_D against dorsiflexion, K_P "

@@ -60,7 +60,7 @@ def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
     row = run.evaluation.row
     speed = number_text(row("walking_speed").value, row("walking_speed").quantity)
     knees = " and ".join(
-        f"{to_degrees(run.run.metrics[f'min_stance_knee_flexion_{side}']):.1f} deg {side}"
+        f"{to_degrees(row(f'min_stance_knee_flexion_{side}').value or 0.0):.1f} deg {side}"
         for side in SIDES
     )
     gait = f"at {speed} m/s with a least stance knee flexion of {knees}"
