@@ -251,10 +251,10 @@ def test_assumptions_name_sources_proof_and_changed_values(
     page = page_of([folder])
     rows = {row.cells[0]: row.cells[1] for row in section(page, "What was").tables[0].rows}
     assert rows["Config"] == "bounds.friction = 0.6"
-    assert "knee_l at its lower bound 0.264 rad (15.1 deg) in left_toe" in rows["Active bounds"]
+    assert "left knee at its lower bound 0.264 rad (15.1 deg) in left toe" in rows["Active bounds"]
     assert "walking speed at its lower bound 0.636 m/s" in rows["Active bounds"]
     assert "1 more of muscles" in rows["Active bounds"]
-    assert "reached: largest violation 2.0e-09 (knee_r rate" in rows["Tolerances"]
+    assert "reached: largest violation 2.0e-09 (right knee rate" in rows["Tolerances"]
     assert "asked for: 0.001, 0.01" in rows["Re-integration"]
     assert "age for Jensen" in rows["Mass, strengths"]
     assert "pathwalker 0.1.0" in rows["Versions"]
@@ -456,6 +456,9 @@ def test_studies_that_do_not_fit_are_refused_when_named(runs: Path, tmp_path: Pa
     path.write_text(json.dumps(content | {"elasticities": {"a": {"cost": "b"}}}))
     sentence = refusal(runs / "mapd-orthosis", studies / "sensitivity", "-o", out)
     assert "does not hold what `pathwalker sensitivity` writes" in sentence
+    broken = Path(shutil.copytree(studies / "sensitivity", runs / "broken"))
+    (broken / "sensitivity.json").write_text("{")
+    assert page_of([runs / "mapd-orthosis"]).sections, "a study that nobody named does not matter"
     path.write_text("[]")
     assert "is no summary" in refusal(runs / "mapd-orthosis", studies / "sensitivity", "-o", out)
 
