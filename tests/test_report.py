@@ -278,10 +278,15 @@ def test_a_changed_patient_and_a_quick_check_are_told(
     folder = write_made_run(tmp_path / "run", made_solution, "mapd-orthosis", config=config)
     metrics = json.loads((folder / "metrics.json").read_text())
     metrics["input_hashes"]["patient"] = "0" * 64
+    metrics["reintegration_velocity_error"] = 0.02
     (folder / "metrics.json").write_text(json.dumps(metrics))
     warnings = page_of([folder]).warnings
     assert "a quick check on a coarse mesh" in warnings[0]
-    assert "no longer that of the run" in warnings[1]
+    assert "the mesh is too coarse" in warnings[1]
+    assert "no longer that of the run" in warnings[2]
+    assert (
+        page_of([write_made_run(tmp_path / "fine", made_solution, "mapd-orthosis")]).warnings == ()
+    )
 
 
 @pytest.mark.usefixtures("no_curves")
@@ -468,8 +473,9 @@ def test_studies_that_do_not_fit_are_refused_when_named(runs: Path, tmp_path: Pa
 
 CASES = (
     "case,patient,problem,status,walking_speed [m/s],dorsiflexion_stiffness_right [N m/rad],"
-    "dorsiflexion_stiffness_left [N m/rad],effort_per_distance [s/m]\n"
-    "anna--mapd-orthosis,anna,mapd-orthosis,converged,0.7,91.96,60.04,0.25\n"
+    "dorsiflexion_stiffness_left [N m/rad],effort_per_distance [s/m],"
+    "reintegration_position_error [rad or m]\n"
+    "anna--mapd-orthosis,anna,mapd-orthosis,converged,0.7,91.96,60.04,0.25,2e-4\n"
     f"ben--mapd-orthosis,ben,mapd-orthosis,failed: {HOSTILE},,,,\n"
     "ben--mapd-barefoot--x,ben,mapd-barefoot,not yet run,,,,\n"
 )
@@ -487,6 +493,7 @@ def test_a_cohort_shows_failures(tmp_path: Path) -> None:
     good, failed, waiting = page.sections[0].tables[0].rows
     assert good.cells == (
         "anna", "mapd-orthosis", "-", "converged", "0.700", "-", "-", "92.0, 60.0", "-", "0.250",
+        "2.0e-04",
     )  # fmt: skip
     assert failed.mark == waiting.mark == "failed"
     assert HOSTILE in failed.cells[3]

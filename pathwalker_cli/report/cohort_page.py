@@ -20,6 +20,7 @@ _COLUMNS: Final = ("case", "patient", "problem", "status")
 _HEAD: Final = (
     "patient", "problem", "case", "status", "speed [m/s]", "step r, l [m]",
     "least knee flexion r, l [deg]", "K_D r, l [N m/rad]", "K_P r, l [N m/rad]", "effort [s/m]",
+    "re-integration [rad, m]",
 )  # fmt: skip
 _DEGREES: Final = float(to_degrees(1.0))
 
@@ -77,10 +78,11 @@ def _quick_checks(tables: Mapping[Path, Rows]) -> list[str]:
 def _section(folder: Path, rows: Rows) -> Section:
     """Return the table of a batch."""
     notes = (
+        "re-integration: by how much an independent integrator misses the next node at most",
         "r, l: right, left; springs are those of least effort, K_D against dorsiflexion, K_P "
         "against plantarflexion",
     )
-    table = Table(_HEAD, tuple(map(_row, rows)), notes=notes, columns="wwwpnnnnnn")
+    table = Table(_HEAD, tuple(map(_row, rows)), notes=notes, columns="wwwpnnnnnnn")
     return Section(folder.resolve().name, tables=(table,))
 
 
@@ -97,6 +99,7 @@ def _row(row: Mapping[str, str]) -> Row:
         _pair(row, "dorsiflexion_stiffness", ".1f"),
         _pair(row, "plantarflexion_stiffness", ".1f"),
         number(row, "effort_per_distance", ".3f"),
+        number(row, "reintegration_position_error", ".1e") if converged else "-",
     )  # fmt: skip
     return Row(cells, "" if converged else "failed")
 
