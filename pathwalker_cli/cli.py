@@ -55,6 +55,11 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "rerun_command",
         "Solve a run again from its folder alone and tell how the two differ.",
     ),
+    "compare": (
+        "pathwalker_cli.commands.compare",
+        "compare_command",
+        "Compare the metrics of runs, with differences and figures.",
+    ),
     "report": (
         "pathwalker_cli.commands.report",
         "report_command",

@@ -479,7 +479,7 @@ def test_model_writes_the_urdf(here: Path) -> None:
         (["nobody", "--condition", "barefoot"], "no patient 'nobody'"),
         (["sreenivasa2017-healthy", "--condition", "orthosis"], "orthosis"),
         ([PATIENT, "--condition", "barefoot", "-o", "."], "is a folder"),
-        ([PATIENT, "--condition", "barefoot", "-o", "no/where.urdf"], "no such folder"),
+        ([PATIENT, "--condition", "barefoot", "-o", "no/where.urdf"], "cannot be written"),
         ([PATIENT, "--condition", "sandals"], "'barefoot', 'orthosis'"),
     ],
 )

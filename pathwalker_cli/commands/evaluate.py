@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,9 +36,10 @@ def evaluate_command(
     """
     from pathwalker_cli.evaluation.evaluate import evaluate_gait
     from pathwalker_cli.evaluation.files import evaluation_content
+    from pathwalker_cli.evaluation.run import gaits_of_runs
     from pathwalker_cli.io.json_file import json_text
 
-    gaits = _gaits(runs)
+    gaits = gaits_of_runs(runs)
     trials = _trials(gaits, trial)
     evaluations = [evaluate_gait(gait, name) for gait, name in zip(gaits, trials, strict=True)]
     changes = _changes(evaluations)
@@ -50,16 +50,6 @@ def evaluate_command(
         click.echo(json_text(content), nl=False)
     else:
         _report(evaluations, changes, out)
-
-
-def _gaits(runs: Sequence[Path]) -> list[Gait]:
-    """Return the gaits of the runs under names that differ."""
-    from pathwalker_cli.evaluation.run import gait_of_run, run_names
-
-    names = run_names(runs)
-    return [
-        replace(gait_of_run(folder), name=name) for folder, name in zip(runs, names, strict=True)
-    ]
 
 
 def _trials(gaits: Sequence[Gait], trial: str | None) -> list[str | None]:

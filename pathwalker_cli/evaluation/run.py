@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
@@ -17,7 +18,26 @@ from pathwalker_cli.ocp.series import GaitSeries, gait_series
 from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.output.run_folder import Run, load_run
 
-__all__ = ["gait_of_run", "gait_of_series", "run_names", "run_notes", "stride_of_run"]
+__all__ = [
+    "gait_of_run",
+    "gait_of_series",
+    "gaits_of_runs",
+    "run_names",
+    "run_notes",
+    "stride_of_run",
+]
+
+
+def gaits_of_runs(folders: Sequence[Path]) -> tuple[Gait, ...]:
+    """Return the gaits of several runs under names that differ.
+
+    Raises:
+        DataError: If a run is named twice or cannot be used.
+    """
+    names = run_names(folders)
+    return tuple(
+        replace(gait_of_run(folder), name=name) for folder, name in zip(folders, names, strict=True)
+    )
 
 
 def run_names(folders: Sequence[Path]) -> tuple[str, ...]:

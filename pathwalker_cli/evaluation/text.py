@@ -33,6 +33,7 @@ _DIGITS: Final = {
     "N m/rad": 1,
     "s/m": 3,
     "1/min": 1,
+    "J": 2,
 }
 """Digits after the point by unit; angles as degrees, shares of the stride in per cent."""
 

@@ -80,4 +80,16 @@ def traces(
     """
     behind = recorded or [None] * len(gaits)
     rows = zip(gaits, labels, behind, strict=True)
-    return tuple(Trace(*row, order=i) for i, row in enumerate(rows))
+    return tuple(
+        Trace(gait, _plain(label), recordings, order=i)
+        for i, (gait, label, recordings) in enumerate(rows)
+    )
+
+
+def _plain(label: str) -> str:
+    """Return a label that Matplotlib takes as it stands: no formula, no hidden entry.
+
+    Names of folders may hold anything.
+    """
+    printable = "".join(c if c.isprintable() else "?" for c in label).replace("$", r"\$")
+    return f" {printable}" if printable.startswith("_") else printable

@@ -54,8 +54,9 @@ def check_output(path: str | Path) -> None:
     target = Path(path)
     if target.is_dir():
         raise DataError("is a folder", where=str(path), mend="name a file in it")
-    if not target.parent.is_dir():
-        raise DataError("no such folder", where=str(target.parent), mend="make it first")
+    if not target.absolute().parent.is_dir():
+        what = f"cannot be written: there is no folder {target.parent}"
+        raise DataError(what, where=str(path), mend="make it first, or choose another file")
     if not os.access(target.parent, os.W_OK | os.X_OK):
         mend = "choose another folder"
         raise DataError("cannot be written", where=str(target.parent), mend=mend)

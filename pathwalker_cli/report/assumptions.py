@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.conventions import LEG_JOINTS, SUFFIX
 from pathwalker_cli.ocp.verify import ActiveBound
 from pathwalker_cli.output.solve_text import bound_line, interesting, source_lines
+from pathwalker_cli.report.config_values import changed_values
 from pathwalker_cli.report.content import Section, fact_table
 from pathwalker_cli.report.runs import ReportRun
 
-__all__ = ["assumption_section", "config_differences", "flat_config"]
+__all__ = ["assumption_section"]
 
 _METHODS: Final = {
     "collocation": "direct collocation",
     "multiple-shooting": "direct multiple shooting",
 }
+_JOINT: Final = re.compile(rf"\b({'|'.join(LEG_JOINTS)})_([rl])\b")
+_TWO_FEET: Final = re.compile(r"\b(right|left)_(toe|flat)_(right|left)_(heel|flat)\b")
+_SIDE: Final = {suffix: side for side, suffix in SUFFIX.items()}
 _HASH: Final = 12
 """Digits of a hash that tell files apart."""
 
@@ -28,25 +33,6 @@ def assumption_section(runs: Sequence[ReportRun]) -> Section:
     rows = tuple((label, *(column.get(label, "-") for column in columns)) for label in labels)
     head = ("", *(run.label for run in runs))
     return Section("What was assumed, and what was reached", tables=(fact_table(rows, head),))
-
-
-def config_differences(config: StudyConfig) -> dict[str, str]:
-    """Return the keys of a config whose values are not the defaults of its problem."""
-    bare = flat_config(StudyConfig(problem=config.problem, patient=config.patient))
-    return {key: text for key, text in flat_config(config).items() if bare.get(key) != text}
-
-
-def flat_config(config: StudyConfig) -> dict[str, str]:
-    """Return every value of a config as text by dotted key."""
-    return dict(_flat("", config.model_dump(mode="json")))
-
-
-def _flat(prefix: str, content: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for key, value in content.items():
-        if isinstance(value, Mapping) and value:
-            yield from _flat(f"{prefix}{key}.", value)
-        else:
-            yield f"{prefix}{key}", str(value)
 
 
 def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
@@ -74,12 +60,13 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
         ),
     )
     yield "Active bounds", "; ".join(_bounds(metrics)) or "none that shapes the gait"
+    worst = _in_words(_text(metrics, "largest_violation_name"))
     yield (
         "Tolerances",
         (
             f"optimality {config.solver.tolerance:g}, constraints "
             f"{config.solver.constraint_tolerance:g}; reached: largest violation "
-            f"{_short(metrics, 'largest_violation')} ({_text(metrics, 'largest_violation_name')})"
+            f"{_short(metrics, 'largest_violation')} ({worst})"
         ),
     )
     yield (
@@ -110,7 +97,7 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
     yield "Versions", ", ".join(f"{name} {number}" for name, number in versions.items())
     hashes = metrics.get("input_hashes") or {}
     yield "Inputs", ", ".join(f"{name} {str(h)[:_HASH]}" for name, h in hashes.items())
-    changed = config_differences(config)
+    changed = changed_values(config)
     yield "Config", "; ".join(f"{k} = {v}" for k, v in changed.items()) or "all defaults"
 
 
@@ -118,13 +105,19 @@ def _bounds(metrics: Mapping[str, Any]) -> Iterator[str]:
     """Yield the active bounds that are choices, where they come from, and how many others."""
     bounds = [bound for text in metrics.get("active_bounds") or () if (bound := _bound(str(text)))]
     chosen = [bound for bound in bounds if interesting(bound)]
-    yield from map(bound_line, chosen)
+    yield from (_in_words(bound_line(bound)) for bound in chosen)
     given = metrics.get("bound_sources") or {}
     sources = {b.name: given[b.name] for b in chosen if b.name in given}
     yield from source_lines(sources)
     others = len(metrics.get("active_bounds") or ()) - len(chosen)
     if others:
         yield f"{others} more of muscles, ground forces and foot heights at their natural limits"
+
+
+def _in_words(text: str) -> str:
+    """Return a text that says "right knee" for "knee_r" and names feet and joints without "_"."""
+    text = _JOINT.sub(lambda found: f"{_SIDE[found[2]]} {found[1]}", text)
+    return _TWO_FEET.sub(r"\1 \2 with \3 \4", text).replace("_", " ")
 
 
 def _bound(text: str) -> ActiveBound | None:

@@ -9,15 +9,18 @@ from typing import Final
 from pathwalker_cli.conventions import SIDES, to_degrees
 from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
 from pathwalker_cli.report.csv_table import number, read_rows
-from pathwalker_cli.studies.batch.ledger import TABLE
-from pathwalker_cli.studies.batch.table import CONVERGED, PENDING
+from pathwalker_cli.studies.batch.ledger import CASES, TABLE
+from pathwalker_cli.studies.batch.table import CONVERGED, PENDING, read_metrics
 
 __all__ = ["cohort_page"]
+
+Rows = Sequence[Mapping[str, str]]
 
 _COLUMNS: Final = ("case", "patient", "problem", "status")
 _HEAD: Final = (
     "patient", "problem", "case", "status", "speed [m/s]", "step r, l [m]",
     "least knee flexion r, l [deg]", "K_D r, l [N m/rad]", "K_P r, l [N m/rad]", "effort [s/m]",
+    "re-integration [rad, m]",
 )  # fmt: skip
 _DEGREES: Final = float(to_degrees(1.0))
 
@@ -39,10 +42,11 @@ def cohort_page(folders: Sequence[Path]) -> Page:
     )
     answer = f"{counts['Converged']} of {len(rows)} cases of {len(patients)} patients converged."
     sections = tuple(_section(folder, own) for folder, own in tables.items())
-    return Page("Cohort", facts, answer, tuple(_warnings(counts)), sections)
+    warnings = [*_warnings(counts), *_quick_checks(tables)]
+    return Page("Cohort", facts, answer, tuple(warnings), sections)
 
 
-def _counts(rows: Sequence[Mapping[str, str]]) -> dict[str, int]:
+def _counts(rows: Rows) -> dict[str, int]:
     """Return how many cases converged, failed and wait."""
     states = [row["status"] for row in rows]
     done, waiting = states.count(CONVERGED), states.count(PENDING)
@@ -58,13 +62,27 @@ def _warnings(counts: Mapping[str, int]) -> list[str]:
     return found
 
 
-def _section(folder: Path, rows: Sequence[Mapping[str, str]]) -> Section:
+def _quick_checks(tables: Mapping[Path, Rows]) -> list[str]:
+    """Return a warning if cases are quick checks."""
+    found = [
+        metrics
+        for folder, rows in tables.items()
+        for row in rows
+        if (metrics := read_metrics(folder / CASES / row["case"])) and metrics.get("smoke")
+    ]
+    if not found:
+        return []
+    return [f"{len(found)} cases are quick checks on coarse meshes: numbers for orientation only"]
+
+
+def _section(folder: Path, rows: Rows) -> Section:
     """Return the table of a batch."""
     notes = (
+        "re-integration: by how much an independent integrator misses the next node at most",
         "r, l: right, left; springs are those of least effort, K_D against dorsiflexion, K_P "
         "against plantarflexion",
     )
-    table = Table(_HEAD, tuple(map(_row, rows)), notes=notes, columns="wwwpnnnnnn")
+    table = Table(_HEAD, tuple(map(_row, rows)), notes=notes, columns="wwwpnnnnnnn")
     return Section(folder.resolve().name, tables=(table,))
 
 
@@ -81,6 +99,7 @@ def _row(row: Mapping[str, str]) -> Row:
         _pair(row, "dorsiflexion_stiffness", ".1f"),
         _pair(row, "plantarflexion_stiffness", ".1f"),
         number(row, "effort_per_distance", ".3f"),
+        number(row, "reintegration_position_error", ".1e") if converged else "-",
     )  # fmt: skip
     return Row(cells, "" if converged else "failed")
 

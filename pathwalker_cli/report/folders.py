@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -55,7 +56,9 @@ class Study:
     @property
     def optimum(self) -> Mapping[str, Any]:
         """Measures of the optimum that it stands on."""
-        found = self.content.get("optimum") or self.content.get("start", {}).get("measures", {})
+        found = self.content.get("optimum")
+        if found is None and isinstance(start := self.content.get("start"), Mapping):
+            found = start.get("measures")
         return found if isinstance(found, Mapping) else {}
 
     def stands_on(self, metrics: Mapping[str, Any]) -> bool:
@@ -163,9 +166,9 @@ def studies_near(
             found[kind] = study
     for folder, metrics in runs:
         for kind, place in _near_folders(folder):
-            if kind not in found:
+            with suppress(DataError):  # nobody named it
                 study = Study(place, kind, read_json(place / STUDIES[kind]))
-                if study.stands_on(metrics):
+                if kind not in found and study.stands_on(metrics):
                     found[kind] = study
     return tuple(found[kind] for kind in STUDIES if kind in found)
 

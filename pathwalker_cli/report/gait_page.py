@@ -60,7 +60,7 @@ def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
     row = run.evaluation.row
     speed = number_text(row("walking_speed").value, row("walking_speed").quantity)
     knees = " and ".join(
-        f"{to_degrees(run.run.metrics[f'min_stance_knee_flexion_{side}']):.1f} deg {side}"
+        f"{to_degrees(row(f'min_stance_knee_flexion_{side}').value or 0.0):.1f} deg {side}"
         for side in SIDES
     )
     gait = f"at {speed} m/s with a least stance knee flexion of {knees}"
@@ -98,9 +98,22 @@ def _warnings(runs: Sequence[ReportRun]) -> list[str]:
             found.append(
                 f"{run.label}: a quick check on a coarse mesh: numbers for orientation only"
             )
+        if _coarse(run):
+            found.append(
+                f"{run.label}: an independent integrator misses the mesh by more than the config "
+                "asks for: the mesh is too coarse"
+            )
         if run.patient_changed:
             found.append(
                 f"{run.label}: the patient's file is no longer that of the run; age, mass, height "
                 "and forces per weight are those of today's file"
             )
     return found
+
+
+def _coarse(run: ReportRun) -> bool:
+    """Return whether re-integration misses the nodes by more than the mesh was to allow."""
+    mesh = run.run.config.mesh
+    asked = {"position": mesh.position_tolerance, "velocity": mesh.velocity_tolerance}
+    reached = {kind: run.run.metrics.get(f"reintegration_{kind}_error") for kind in asked}
+    return any(value is not None and value > asked[kind] for kind, value in reached.items())

@@ -20,7 +20,9 @@ _UNIT: Final = re.compile(r"(?<=\d) (?=%|N m|m/s|s/m|deg\b|kg\b)|(?<=\bN) (?=m\b
 
 def page_html(page: Page) -> str:
     """Return a page as HTML; all its texts are escaped, the figures are ours."""
-    return _environment().get_template("page.html.j2").render(page=page, version=__version__)
+    template = _environment().get_template("page.html.j2")
+    text = template.render(page=page, version=__version__)
+    return text.encode(errors="replace").decode()  # names of files need not be Unicode
 
 
 @cache

@@ -73,7 +73,7 @@ def _sections(folder: Path, origin: Mapping[str, Any], index: int) -> list[Secti
     stances = read_rows(folder / "stances.csv", _STANCES)
     who = str(origin["patient"])
     facts = tuple(
-        Fact(label, f"{origin[key]} {unit}".strip())
+        Fact(label, f"{_plain(origin[key])} {unit}".strip())
         for label, key, unit in (
             ("Age", "age", "years"), ("Mass", "body_mass", "kg"), ("Height", "height", "m"),
             ("Method", "method", ""),
@@ -98,6 +98,10 @@ def _sections(folder: Path, origin: Mapping[str, Any], index: int) -> list[Secti
     lines = (*(f"{note}." for note in notes), *([f"Versions: {versions}."] if versions else []))
     found.append(Section(f"What was assumed, {who}", tuple(lines)))
     return found
+
+
+def _plain(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 def _stance_table(rows: Rows) -> Table:

@@ -61,7 +61,10 @@ def verdict_words(spring: SpringVerdict) -> str:
 
 
 def _identified(run: ReportRun, name: str) -> float:
-    return float(run.run.metrics[name])
+    stiffness = run.evaluation.gait.stiffness
+    if stiffness is None:
+        raise ValueError(f"{run.label} wears no orthoses")
+    return float(stiffness[STIFFNESSES.index(name)])
 
 
 def _row(run: ReportRun, name: str) -> Row:

@@ -85,7 +85,8 @@ def _perturbation(study: Study) -> Section:
 
 
 def _change(share: float | None) -> str:
-    return "no solution" if share is None else f"{100.0 * share:+.2f}"
+    # adding 0.0 makes +0.00 of -0.00
+    return "no solution" if share is None else f"{round(100.0 * share, 2) + 0.0:+.2f}"
 
 
 def _landscape(study: Study) -> Section:

@@ -81,6 +81,8 @@ def draw_band(ax: Axes, band: Band | None, side: Side, factor: float) -> None:
     colour, style = LINE_COLOUR[side], LINE_STYLE[side]
     low, high = sorted((factor * band.low, factor * band.high), key=lambda values: values.mean())
     ax.fill_between(band.percent, low, high, color=colour, alpha=0.15, linewidth=0)
+    for edge in (low, high):  # so that the ranges of both sides differ without colour too
+        ax.plot(band.percent, edge, color=colour, linestyle=style, linewidth=0.4, alpha=0.6)
     mean = factor * band.mean
     ax.plot(band.percent, mean, color=colour, linestyle=style, linewidth=0.7, alpha=0.6)
 

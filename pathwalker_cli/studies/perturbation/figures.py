@@ -44,9 +44,9 @@ def perturbation_figure(result: Perturbation) -> Figure:
     with mpl.rc_context(STYLE):
         fig = new_figure(PAGE, 1.6 + 0.55 * len(result.rows))
         panels = fig.subplots(2, 3, sharey=True)
-        for i, (ax, key) in enumerate(zip(panels.flat, COMPARED, strict=True)):
+        for ax, key in zip(panels.flat, COMPARED, strict=True):
             _draw(ax, result, key)
-            dress(ax, measure_of(key).label, "change [%]" if i >= 3 else "")
+            dress(ax, measure_of(key).label, "change [%]")
             ax.grid(visible=False, axis="y")
         ax = panels[0, 0]
         ax.set_yticks(range(len(result.rows)), [_label(result, row) for row in result.rows])

@@ -28,7 +28,9 @@ _PANELS: Final = (
 _BARS: Final = 8
 """Numbers shown per panel, the strongest ones."""
 
-_MORE, _LESS = "#0072B2", "#D55E00"
+_MORE: Final = "#009E73"
+_LESS: Final = "#CC79A7"
+"""Green and purple of the palette by Okabe and Ito: blue and vermilion stand for sides."""
 
 
 def sensitivity_figure(result: Sensitivities) -> Figure:

@@ -159,6 +159,6 @@ def correlation_figure(result: Uncertainty, found: list[Spread]) -> Figure:
         ax.set_xticks(range(len(found)), [s.measure.short for s in found], rotation=45, ha="right")
         ax.tick_params(labelsize=SMALL, length=0.0)
         ax.set_title(f"Rank correlation; numbers where chance ({level:.2f}) does not explain it")
-        bar = fig.colorbar(image, ax=ax, pad=0.01)
+        bar = fig.colorbar(image, ax=ax, pad=0.01, label="rank correlation [1]")
         bar.ax.tick_params(labelsize=SMALL)
         return fig

@@ -1,0 +1,579 @@
+"""The command `report`: content, self-contained and valid HTML, escaping, refusals, cohorts."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import xml.etree.ElementTree as ET
+from collections import Counter
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from conftest import MadeSolution
+from pathwalker_cli.cli import cli
+from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.evaluation.text import number_text
+from pathwalker_cli.inverse.study import load_inverse_dynamics
+from pathwalker_cli.patient import load_patient
+from pathwalker_cli.report import figures
+from pathwalker_cli.report.build import page_of
+from pathwalker_cli.report.config_values import changed_values, differing_values
+from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
+from pathwalker_cli.report.gait_page import gait_page
+from pathwalker_cli.report.html import page_html
+from pathwalker_cli.report.runs import read_runs
+from pathwalker_cli.report.springs import recommended, spring_section, verdict_words
+from pathwalker_cli.studies.verdict import verdict_of_metrics
+from report_runs import HOSTILE, made_verdict, write_made_run
+
+VOID = frozenset({"meta", "link", "br", "hr", "img", "input", "col"})
+CHILD = Path(__file__).parent / "data" / "child-10y" / "patient.yaml"
+
+
+class Balanced(HTMLParser):
+    """Checks that every element is closed where it should be, and counts ids."""
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.ids: Counter[str] = Counter()
+        self.tags: Counter[str] = Counter()
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._note(tag, attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._note(tag, attrs)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if "style" not in self.open:
+            self.text += data
+
+    def _note(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        names = [name for name, _ in attrs]
+        assert len(names) == len(set(names)), f"<{tag}> has an attribute twice"
+        assert not any(name.startswith("on") for name in names), f"<{tag}> runs something"
+        self.tags[tag] += 1
+        self.ids.update(value or "" for name, value in attrs if name == "id")
+
+
+def checked(text: str) -> Balanced:
+    """Return what a page holds after checking that it is valid and needs nothing else."""
+    parser = Balanced()
+    parser.feed(text)
+    parser.close()
+    assert parser.open == []
+    assert [name for name, count in parser.ids.items() if count > 1] == []
+    assert text.startswith("<!DOCTYPE html>")
+    assert not parser.tags.keys() & {"script", "link", "img", "iframe", "object"}
+    assert set(re.findall(r"https?://[^\"'\s<>)]+", text)) <= {"http://www.w3.org/2000/svg"}
+    assert "@import" not in text
+    for target in re.findall(r"url\(#([^)]+)\)|href=\"#([^\"]+)\"", text):
+        assert "".join(target) in parser.ids, target
+    return parser
+
+
+def report(*words: object) -> Result:
+    """Run the command."""
+    return CliRunner().invoke(cli, ["report", *map(str, words)])
+
+
+def refusal(*words: object) -> str:
+    """Return the one sentence with which the command refuses."""
+    result = report(*words)
+    assert result.exit_code == 2, result.output
+    assert result.output.count("\n") == 1
+    assert "Traceback" not in result.output
+    return result.output
+
+
+@pytest.fixture(scope="module")
+def written(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a barefoot run and of one with orthoses."""
+    folder = tmp_path_factory.mktemp("report")
+    for problem in ("mapd-barefoot", "mapd-orthosis"):
+        write_made_run(folder / problem, made_solution, problem)
+    return folder
+
+
+@pytest.fixture
+def runs(written: Path, tmp_path: Path) -> Path:
+    """Return a folder with copies of both runs that may be changed."""
+    return Path(shutil.copytree(written, tmp_path / "made"))
+
+
+@pytest.fixture
+def no_curves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the curves out, which take most of the time."""
+    monkeypatch.setattr(
+        "pathwalker_cli.report.gait_page.curve_section", lambda runs: Section("Curves")
+    )
+
+
+def section(page: Page, title: str) -> Section:
+    """Return the section whose title begins so."""
+    return next(each for each in page.sections if each.title.startswith(title))
+
+
+def words_of(page: Page) -> str:
+    """Return all words of a page."""
+    return checked(page_html(page)).text
+
+
+# The page of one patient
+
+
+def test_a_page_is_self_contained_and_valid(runs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "page.html"
+    result = report(runs / "mapd-orthosis", runs / "mapd-barefoot", "-o", out)
+    assert result.exit_code == 0, result.output
+    text = out.read_text(encoding="utf-8")
+    assert out.stat().st_size < 2_000_000
+    page = checked(text)
+    for words in (
+        "sreenivasa2017-patient",
+        "24.7 kg",
+        "1.25 m",
+        "not a medical device",
+        "roughly determined",
+        "at the limit of what can be bought",
+    ):
+        assert words in page.text.replace("\N{NO-BREAK SPACE}", " "), words
+    drawings = re.findall(r"<svg.*?</svg>", text, re.DOTALL)
+    assert len(drawings) == 16, (
+        "five angles, two forces, three moments, ankle, four muscles, legend"
+    )
+    for drawing in drawings:
+        root = ET.fromstring(drawing)
+        assert root.get("aria-label")
+        assert root.get("viewBox")
+        assert root.get("role") == "img"
+        assert root.find("{http://www.w3.org/2000/svg}title").text == root.get("aria-label")  # type: ignore[union-attr]
+        assert "<text" in drawing, "text stays text"
+        assert "sans-serif" in drawing
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_numbers_of_the_page_are_those_of_the_runs(runs: Path) -> None:
+    found = read_runs([runs / "mapd-orthosis", runs / "mapd-barefoot"])
+    assert [run.label for run in found] == ["barefoot", "orthosis"]
+    table = section(gait_page(found), "Gait").tables[0]
+    assert table.head == (
+        "", "unit", "barefoot", "recorded, mean [min, max]", "is", "orthosis",
+        "recorded, mean [min, max]", "is", "change", "[%]", "recorded change",
+    )  # fmt: skip
+    rows = {row.cells[0]: row.cells for row in table.rows}
+    for key, label in (
+        ("walking_speed", "walking speed"),
+        ("cadence", "cadence"),
+        ("stance_share_left", "stance share, left"),
+        ("swing_time_right", "swing time, right"),
+        ("double_support_share", "double support share"),
+        ("min_stance_knee_flexion_left", "least stance knee flexion (crouch), left"),
+        ("peak_vertical_force_right", "peak vertical force, right"),
+        ("effort_per_distance", "effort per distance"),
+    ):
+        barefoot, orthosis = (run.evaluation.row(key) for run in found)
+        assert rows[label][2] == number_text(barefoot.value, barefoot.quantity)
+        assert rows[label][5] == number_text(orthosis.value, orthosis.quantity)
+        assert rows[label][4] == (barefoot.position or "")
+        assert barefoot.value is not None
+        assert orthosis.value is not None
+        change = orthosis.value - barefoot.value
+        assert rows[label][8] == number_text(change, barefoot.quantity, sign=True)
+    metrics = found[0].run.metrics
+    shares = [metrics[f"stance_share_{side}"] for side in ("right", "left")]
+    assert rows["stance share, left"][2] == f"{100 * shares[1]:.1f}"
+    assert rows["double support share"][2] == f"{100 * (sum(shares) - 1):.1f}"
+    assert rows["cadence"][2] == f"{metrics['cadence']:.1f}"
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_springs_are_real_ones_in_both_units_with_range_and_verdict(runs: Path) -> None:
+    (run,) = read_runs([runs / "mapd-orthosis"])
+    found = spring_section(run)
+    cells = {row.cells[0]: row.cells for row in found.tables[0].rows}
+    assert cells["K_D left"][1:4] == ("stiff", "91.7", "1.60")
+    assert cells["K_D left"][5:7] == ("60.0 to 92.0", "1.05 to 1.61")
+    assert cells["K_D left"][7].endswith("at the limit of what can be bought (stiffest)")
+    assert cells["K_P right"][1:4] == ("softest", "5.0", "0.09")
+    assert cells["K_P right"][7] == "not determined"
+    facts = {fact.label: fact.text for fact in found.facts}
+    assert "cost +0.1 %, 0.636 m/s" in facts["Real springs"]
+    assert "exceeded by 2.9 deg" in facts["Hard stops"]
+    assert "K_D left: it sits at the upper limit" in facts["Limits and doubts"]
+    assert recommended(run)["plantarflexion_stiffness_left"] == 5.0
+    answer = gait_page([run]).answer
+    assert answer.startswith(
+        "Springs to take: K_D 91.7 N m/rad (roughly determined) right and left"
+    )
+
+
+def test_without_a_verdict_the_page_says_so(made_solution: MadeSolution, tmp_path: Path) -> None:
+    folder = write_made_run(tmp_path / "run", made_solution, "mapd-ws-orthosis")
+    (run,) = read_runs([folder])
+    found = spring_section(run)
+    assert "were not judged" in found.lines[0]
+    assert {row.cells[7] for row in found.tables[0].rows} == {"not judged"}
+    assert found.tables[0].rows[0].cells[2] == "50.0"
+    assert gait_page([run]).answer.startswith("Springs of least effort: K_D 50.0 N m/rad right")
+
+
+def test_a_verdict_comes_back_from_the_metrics() -> None:
+    verdict = made_verdict()
+    plain = json.loads(json.dumps(verdict.as_dict()))
+    assert verdict_of_metrics({"verdict": plain}) == verdict
+    assert verdict_of_metrics({}) is None
+    again = made_verdict(snapped=None)
+    assert verdict_of_metrics({"verdict": json.loads(json.dumps(again.as_dict()))}) == again
+    assert verdict_words(verdict.springs[2]) == "not determined"
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_assumptions_name_sources_proof_and_changed_values(
+    made_solution: MadeSolution, tmp_path: Path
+) -> None:
+    config = made_solution().config
+    bounds = config.bounds.model_copy(update={"friction": 0.6})
+    config = config.model_copy(update={"bounds": bounds})
+    folder = write_made_run(tmp_path / "run", made_solution, "mapd-orthosis", config=config)
+    page = page_of([folder])
+    rows = {row.cells[0]: row.cells[1] for row in section(page, "What was").tables[0].rows}
+    assert rows["Config"] == "bounds.friction = 0.6"
+    assert "left knee at its lower bound 0.264 rad (15.1 deg) in left toe" in rows["Active bounds"]
+    assert "walking speed at its lower bound 0.636 m/s" in rows["Active bounds"]
+    assert "1 more of muscles" in rows["Active bounds"]
+    assert "reached: largest violation 2.0e-09 (right knee rate" in rows["Tolerances"]
+    assert "asked for: 0.001, 0.01" in rows["Re-integration"]
+    assert "age for Jensen" in rows["Mass, strengths"]
+    assert "pathwalker 0.1.0" in rows["Versions"]
+    assert "42 iterations" in rows["Mesh, iterations"]
+
+
+def test_values_that_are_no_defaults_are_those_of_the_problem(made_solution: MadeSolution) -> None:
+    config = made_solution("mapd-barefoot").config
+    assert changed_values(config) == {}
+    other = config.model_copy(update={"starts": 3})
+    assert changed_values(other) == {"starts": "3"}
+    assert differing_values([config, other]) == {"starts": ("1", "3")}
+    assert differing_values([config, config]) == {}
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_a_changed_patient_and_a_quick_check_are_told(
+    made_solution: MadeSolution, tmp_path: Path
+) -> None:
+    config = made_solution().config.model_copy(update={"smoke": True})
+    folder = write_made_run(tmp_path / "run", made_solution, "mapd-orthosis", config=config)
+    metrics = json.loads((folder / "metrics.json").read_text())
+    metrics["input_hashes"]["patient"] = "0" * 64
+    metrics["reintegration_velocity_error"] = 0.02
+    (folder / "metrics.json").write_text(json.dumps(metrics))
+    warnings = page_of([folder]).warnings
+    assert "a quick check on a coarse mesh" in warnings[0]
+    assert "the mesh is too coarse" in warnings[1]
+    assert "no longer that of the run" in warnings[2]
+    assert (
+        page_of([write_made_run(tmp_path / "fine", made_solution, "mapd-orthosis")]).warnings == ()
+    )
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_runs_of_one_condition_go_by_their_folders(
+    runs: Path, made_solution: MadeSolution, tmp_path: Path
+) -> None:
+    other = write_made_run(tmp_path / HOSTILE.replace("/", "|"), made_solution, "mapd-orthosis")
+    page = page_of([runs / "mapd-orthosis", other])
+    assert [s.title for s in page.sections][:2] == [
+        "Recommended springs, mapd-orthosis",
+        f"Recommended springs, {other.name}",
+    ]
+    text = page_html(page)
+    checked(text)
+    assert "&lt;script&gt;" in text
+
+
+def test_a_name_cannot_be_more_than_text_in_a_figure(
+    made_solution: MadeSolution, runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("ANGLES", "FORCES", "MOMENTS", "ACTIVATIONS"):
+        monkeypatch.setattr(figures, name, ())
+    names = [f"<b>&{chr(1)}$\\foo$", "_hidden"]
+    folders = [write_made_run(tmp_path / n, made_solution, "mapd-orthosis") for n in names]
+    text = page_html(page_of([runs / "mapd-orthosis", *folders]))
+    page = checked(text)
+    assert "<b>" not in text
+    assert "_hidden" in page.text
+    assert "<b>&?$\\foo$" in page.text
+
+
+# Escaping
+
+
+def test_everything_from_files_is_escaped() -> None:
+    table = Table((HOSTILE, "b"), (Row((HOSTILE, HOSTILE)),), HOSTILE, (HOSTILE,))
+    part = Section(HOSTILE, (HOSTILE,), (Fact(HOSTILE, HOSTILE),), (table,))
+    page = Page(HOSTILE, (Fact(HOSTILE, f'" onload="{HOSTILE}'),), HOSTILE, (HOSTILE,), (part,))
+    text = page_html(page)
+    assert checked(text).text.count(HOSTILE) == 15
+    assert "<script" not in text
+
+
+def test_only_drawings_are_taken_as_they_are() -> None:
+    page = Page("a", (), "b", (), (Section("c", drawings=(Drawing("<svg></svg>"),)),))
+    assert '<figure class="pair"><svg></svg></figure>' in page_html(page)
+
+
+def test_a_table_with_rows_of_another_width_is_a_mistake() -> None:
+    with pytest.raises(ValueError, match="2 columns"):
+        Table(("a", "b"), (Row(("1",)),))
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_hostile_notes_and_names_of_a_run_stay_text(runs: Path) -> None:
+    path = runs / "mapd-orthosis" / "metrics.json"
+    metrics = json.loads(path.read_text())
+    metrics["notes"] = [HOSTILE]
+    metrics["start"] = metrics["largest_violation_name"] = metrics["date"] = HOSTILE
+    metrics["active_bounds"] = [HOSTILE]
+    metrics["verdict"]["snapped"]["names"]["dorsiflexion_stiffness_left"] = HOSTILE
+    path.write_text(json.dumps(metrics))
+    assert words_of(page_of([runs / "mapd-orthosis"])).count(HOSTILE) == 5
+
+
+# Refusals
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_bad_input_gets_one_sentence(
+    runs: Path, made_solution: MadeSolution, tmp_path: Path
+) -> None:
+    run, out = runs / "mapd-orthosis", tmp_path / "page.html"
+    assert "no such folder" in refusal("nowhere", "-o", out)
+    assert "holds nothing to report" in refusal(tmp_path, "-o", out)
+    assert "is named twice" in refusal(run, f"{run}/.", "-o", out)
+    assert "is no name of a page" in refusal(run, "-o", tmp_path / "page.txt")
+    assert "there is no folder" in refusal(run, "-o", tmp_path / "no" / "page.html")
+    bad = made_solution(status="maximum number of iterations")
+    folder = write_made_run(tmp_path / "bad", lambda *_, **__: bad, "mapd-orthosis")
+    assert "did not converge" in refusal(run, folder, "-o", out)
+    (tmp_path / "folder.html").mkdir()
+    assert "is a folder" in refusal(run, "-o", tmp_path / "folder.html")
+    assert not out.exists()
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_runs_of_different_patients_are_refused(
+    runs: Path, made_solution: MadeSolution, tmp_path: Path
+) -> None:
+    from pathwalker_cli.model.walker import build_walker
+
+    config = made_solution().config.model_copy(update={"patient": str(CHILD)})
+    walker = build_walker(load_patient(CHILD), "orthosis")
+    child = write_made_run(
+        tmp_path / "child", made_solution, "mapd-orthosis", config=config, walker=walker
+    )
+    sentence = refusal(runs / "mapd-orthosis", child, "-o", tmp_path / "page.html")
+    assert "is a run of patient child-10y" in sentence
+    text = words_of(page_of([child]))
+    assert "patient child-10y has no orthosis recordings" in text
+    assert "recorded, mean" not in text
+
+
+# Studies
+
+
+def write_studies(folder: Path, run: Path, note: str = "") -> None:
+    """Write the summaries of three studies around a run beside it."""
+    metrics = json.loads((run / "metrics.json").read_text())
+    base = {key: metrics[key] for key in ("problem", "patient")}
+    optimum = {key: metrics[key] for key in ("cost", "walking_speed", *STIFFNESSES)}
+    row = {
+        "spring": STIFFNESSES[0], "factor": 0.95, "stiffness": 47.5, "status": "converged",
+        "changes": {"cost": 0.0123, "walking_speed": 0.0}, "note": note,
+    }  # fmt: skip
+    failed = row | {"spring": STIFFNESSES[1], "status": "failed", "changes": {}}
+    elasticities = {
+        "body_mass": {"cost": 1.5, "walking_speed": 0.0, "stride_time": None},
+        "segment_lengths.head": {"cost": 1e-9, "walking_speed": 0.0},
+    }
+    point = {"dorsiflexion_stiffness": 92.0, "plantarflexion_stiffness": 5.0, "measures": optimum}
+    contents = {
+        "perturb/perturbation.json": base | {"optimum": optimum, "rows": [row, failed]},
+        "sensitivity/sensitivity.json": base | {"optimum": optimum, "elasticities": elasticities},
+        "landscape/landscape.json": base | {
+            "start": point, "best": point, "side": "right", "tolerance": 0.05,
+            "dorsiflexion_stiffness": [5.0, 92.0], "plantarflexion_stiffness": [5.0],
+            "region": {"dorsiflexion_stiffness": [60.0, 92.0],
+                       "plantarflexion_stiffness": [5.0, 5.0], "share_of_points": 0.5},
+        },
+    }  # fmt: skip
+    for name, content in contents.items():
+        (folder / name).parent.mkdir(parents=True)
+        (folder / name).write_text(json.dumps(content))
+    (folder / "landscape" / "landscape.csv").write_text(
+        "point,dorsiflexion_stiffness [N m/rad],plantarflexion_stiffness [N m/rad],branch,status,"
+        "cost_increase [1]\na,5,5,1,converged,0.148\nb,92,5,1,converged,0\nb,92,5,2,converged,0.3\n"
+    )
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_studies_beside_a_run_add_their_tables(runs: Path) -> None:
+    write_studies(runs, runs / "mapd-orthosis", HOSTILE)
+    page = page_of([runs / "mapd-orthosis"])
+    rows = section(page, "Perturbation").tables[0].rows
+    assert rows[0].cells[:3] == ("K_D right -5 %", "47.5", "+1.23")
+    assert rows[1].mark == "failed"
+    assert "no solution" in rows[1].cells
+    (row,) = section(page, "Sensitivity").tables[0].rows
+    assert row.cells == ("body mass", "1.500")
+    (row,) = section(page, "Landscape").tables[0].rows
+    assert row.cells == ("5", "14.8", "0.0*")
+    assert "K_D 60.0 to 92.0" in section(page, "Landscape").lines[1]
+    assert HOSTILE in words_of(page)
+    barefoot = page_of([runs / "mapd-barefoot"])
+    assert not any(s.title.startswith("Sensitivity") for s in barefoot.sections)
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_studies_that_do_not_fit_are_refused_when_named(runs: Path, tmp_path: Path) -> None:
+    write_studies(tmp_path / "studies", runs / "mapd-orthosis")
+    studies, out = tmp_path / "studies", tmp_path / "page.html"
+    named = page_of([runs / "mapd-orthosis", studies / "sensitivity"])
+    assert section(named, "Sensitivity").tables
+    assert "stands on another optimum" in refusal(
+        runs / "mapd-barefoot", studies / "sensitivity", "-o", out
+    )
+    assert "a run that was not named" in refusal(studies / "perturb", "-o", out)
+    path = studies / "sensitivity" / "sensitivity.json"
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"elasticities": {"a": {"cost": "b"}}}))
+    sentence = refusal(runs / "mapd-orthosis", studies / "sensitivity", "-o", out)
+    assert "does not hold what `pathwalker sensitivity` writes" in sentence
+    broken = Path(shutil.copytree(studies / "sensitivity", runs / "broken"))
+    (broken / "sensitivity.json").write_text("{")
+    assert page_of([runs / "mapd-orthosis"]).sections, "a study that nobody named does not matter"
+    path.write_text("[]")
+    assert "is no summary" in refusal(runs / "mapd-orthosis", studies / "sensitivity", "-o", out)
+
+
+# Cohorts
+
+
+CASES = (
+    "case,patient,problem,status,walking_speed [m/s],dorsiflexion_stiffness_right [N m/rad],"
+    "dorsiflexion_stiffness_left [N m/rad],effort_per_distance [s/m],"
+    "reintegration_position_error [rad or m]\n"
+    "anna--mapd-orthosis,anna,mapd-orthosis,converged,0.7,91.96,60.04,0.25,2e-4\n"
+    f"ben--mapd-orthosis,ben,mapd-orthosis,failed: {HOSTILE},,,,\n"
+    "ben--mapd-barefoot--x,ben,mapd-barefoot,not yet run,,,,\n"
+)
+
+
+def test_a_cohort_shows_failures(tmp_path: Path) -> None:
+    (tmp_path / "cohort").mkdir()
+    (tmp_path / "cohort" / "cases.csv").write_text(CASES)
+    page = page_of([tmp_path / "cohort"])
+    assert page.answer == "1 of 3 cases of 2 patients converged."
+    assert page.warnings == (
+        "1 cases failed: they have no gait and no springs",
+        "1 cases have not been run yet",
+    )
+    good, failed, waiting = page.sections[0].tables[0].rows
+    assert good.cells == (
+        "anna", "mapd-orthosis", "-", "converged", "0.700", "-", "-", "92.0, 60.0", "-", "0.250",
+        "2.0e-04",
+    )  # fmt: skip
+    assert failed.mark == waiting.mark == "failed"
+    assert HOSTILE in failed.cells[3]
+    assert waiting.cells[2] == "x"
+    assert HOSTILE in words_of(page)
+
+
+def test_quick_checks_of_a_cohort_are_told(made_solution: MadeSolution, tmp_path: Path) -> None:
+    (tmp_path / "cases.csv").write_text(CASES)
+    config = made_solution().config.model_copy(update={"smoke": True})
+    write_made_run(
+        tmp_path / "cases" / "anna--mapd-orthosis", made_solution, "mapd-orthosis", config=config
+    )
+    assert "1 cases are quick checks" in page_of([tmp_path]).warnings[-1]
+
+
+def test_a_broken_table_of_a_cohort_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "cases.csv").write_text("case,patient\n")
+    assert "lacks the column problem" in refusal(tmp_path, "-o", tmp_path / "page.html")
+
+
+def test_kinds_of_pages_do_not_mix(runs: Path, tmp_path: Path) -> None:
+    (tmp_path / "cases.csv").write_text(CASES)
+    sentence = refusal(runs / "mapd-barefoot", tmp_path, "-o", tmp_path / "page.html")
+    assert "do not go on one page" in sentence
+
+
+# Recorded gait
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a study of four recorded trials."""
+    from pathwalker_cli.inverse.evaluate import dynamics_trials
+    from pathwalker_cli.inverse.study_tables import residual_tables, strength_table
+    from pathwalker_cli.output import recorded_study
+
+    folder = tmp_path_factory.mktemp("recorded")
+    study = load_inverse_dynamics("inverse-dynamics", ("conditions=[barefoot]",))
+    patient = load_patient(study.patient)
+    trials = dynamics_trials(study, patient, lambda _: None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recorded_study, "save_recorded_figures", lambda *_: ())
+        recorded_study.write_dynamics(
+            folder, trials, residual_tables(trials, patient, study),
+            strength_table(trials, patient, study), patient.body_mass, study.method,
+        )  # fmt: skip
+        recorded_study.write_origin(folder, patient, study.method)
+    return folder
+
+
+def test_recorded_gait_shows_stances_torques_and_strengths(recorded: Path, tmp_path: Path) -> None:
+    page = page_of([recorded])
+    stances = section(page, "Recorded stances").tables[0].rows
+    assert [row.cells[:5] for row in stances] == [
+        ("barefoot", "right", "13", "13", "4"),
+        ("barefoot", "left", "13", "14", "5"),
+    ]
+    (drawing,) = section(page, "Net joint torques").drawings
+    assert drawing.shape == "wide"
+    assert "barefoot, 13 trials" in drawing.svg
+    strengths = {row.cells[0]: row.cells for row in section(page, "Muscle").tables[0].rows}
+    assert strengths["hip extension, right"][1:3] == ("27.2", "18.6")
+    assert strengths["hip flexion, right"][5] == "-"
+    assert "9 of 27 recorded stances" in page.answer
+    words_of(page)
+
+    copied = Path(shutil.copytree(recorded, tmp_path / "other"))
+    origin = json.loads((copied / "study.json").read_text())
+    origin |= {"patient": HOSTILE, "notes": [HOSTILE], "method": HOSTILE}
+    (copied / "study.json").write_text(json.dumps(origin))
+    both = page_of([recorded, copied])
+    assert both.facts[0].label == "Patients"
+    assert HOSTILE in words_of(both)
+    (copied / "study.json").unlink()
+    assert "lacks study.json" in refusal(copied, "-o", tmp_path / "page.html")
+
+
+def test_a_broken_stance_is_refused(recorded: Path, tmp_path: Path) -> None:
+    copied = Path(shutil.copytree(recorded, tmp_path / "other"))
+    path = copied / "stances.csv"
+    path.write_text(path.read_text().replace("172,245", "x,245"))
+    assert "cannot be used" in refusal(copied, "-o", tmp_path / "page.html")
