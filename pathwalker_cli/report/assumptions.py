@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import LEG_JOINTS, SUFFIX
 from pathwalker_cli.ocp.verify import ActiveBound
 from pathwalker_cli.output.solve_text import bound_line, interesting, source_lines
@@ -35,18 +36,31 @@ def assumption_section(runs: Sequence[ReportRun]) -> Section:
     return Section("What was assumed, and what was reached", tables=(fact_table(rows, head),))
 
 
+def _aim(config: StudyConfig) -> str:
+    """Return in words what the gait is best at."""
+    cost = config.cost
+    if config.fits:
+        return "nearest to a recording"
+    power = cost.activation_power
+    effort = "squared activation" if power == 2 else f"activation to the power {power}"
+    aims = [f"least {effort} per distance"]
+    if cost.walking_speed_weight:
+        aims.append(f"speed (weight {cost.walking_speed_weight:g})")
+    aims += [f"{n.replace('_', ' ')} (weight {cost.goals[n]:g})" for n in cost.wanted.names]
+    return ", ".join(aims)
+
+
 def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
     """Yield label and sentence."""
     metrics, config = run.run.metrics, run.run.config
     walker = run.evaluation.gait.walker
-    goal = "nearest to a recording" if config.fits else "least squared activation per distance"
     quirks = ", with the quirks of the published model" if metrics.get("published_model") else ""
     yield (
         "Model",
         (
             f"flat rigid-body walker of {walker.total_mass:.1f} kg in all with 14 muscle torque "
             f"generators, two contact points per foot; dynamics back end "
-            f"{_text(metrics, 'dynamics_backend')}{quirks}; assumed aim: {goal}"
+            f"{_text(metrics, 'dynamics_backend')}{quirks}; assumed aim: {_aim(config)}"
         ),
     )
     notes = metrics.get("notes") or []
