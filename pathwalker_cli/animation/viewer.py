@@ -24,7 +24,7 @@ __all__ = ["open_viewer", "poses", "show", "walker_geometry"]
 
 _RATE: Final = 60.0
 """Pictures per second [1/s]."""
-_EYE: Final = [0.9, 0.7, 1.5]
+_EYE: Final = [1.2, 0.9, 2.0]
 """Where MeshCat looks from at first: ahead of the walker, above the ground, to its right [m]."""
 _ACROSS: Final[dict[Side, float]] = {"right": -0.07, "left": 0.07}
 """Where the legs of the flat model are drawn, + = to the left [m]."""
