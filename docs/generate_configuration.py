@@ -8,19 +8,17 @@ python docs/generate_configuration.py
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+from typing import Any, Final
 
-from annotated_types import Ge, Le
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematicsConfig
-from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.io.commented_yaml import reasons
+from pathwalker_cli.io.described import described, is_model
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.studies.batch.schema import BatchStudy
 from pathwalker_cli.studies.landscape.study import LandscapeStudy
@@ -61,14 +59,6 @@ command line. `mapd-barefoot.yaml` has the keys of `mapd-orthosis.yaml`.
 *What and why* is the comment that stands beside the key in the shipped file.
 """
 
-_KINDS: Final[dict[Any, str]] = {
-    float: "number",
-    int: "whole number",
-    bool: "true or false",
-    str: "text",
-    Any: "any value",
-}
-
 
 def page() -> str:
     """Return the whole page."""
@@ -78,35 +68,9 @@ def page() -> str:
     return "\n".join(parts)
 
 
-def reasons(path: Path) -> dict[str, str]:
-    """Return the comment of every dotted key of a YAML file.
-
-    A comment goes on in the lines below it that hold only a comment, further in than the key.
-    """
-    found: dict[str, str] = {}
-    parents: list[tuple[int, str]] = []
-    key, commented = "", False
-    for line in path.read_text(encoding="utf-8").splitlines():
-        entry = re.match(r"(?P<indent> *)(?P<key>\w+):(?P<rest>.*)$", line)
-        mark = re.search(r"(?:^|\s)#\s?(?P<text>.*)$", line)
-        if entry:
-            indent = len(entry["indent"])
-            parents = [parent for parent in parents if parent[0] < indent]
-            key = ".".join([*(name for _, name in parents), entry["key"]])
-            parents.append((indent, entry["key"]))
-            commented = mark is not None
-            found[key] = mark["text"].strip() if mark else ""
-        elif mark and commented and line.index("#") > parents[-1][0]:
-            text = mark["text"].strip()
-            found[key] += f"; {text}" if re.match(r"\w+: ", text) else f" {text}"
-        else:
-            commented = False
-    return found
-
-
 def _tables(model: type[BaseModel], why: dict[str, str]) -> Iterator[str]:
     """Yield one table for the keys of a model and one for each model inside it."""
-    inner = {name: f for name, f in model.model_fields.items() if _is_model(f.annotation)}
+    inner = {name: f for name, f in model.model_fields.items() if is_model(f.annotation)}
     plain = {name: f for name, f in model.model_fields.items() if name not in inner}
     plain = dict(sorted(plain.items(), key=lambda entry: not entry[1].is_required()))
     yield _table(plain, "", why)
@@ -125,53 +89,13 @@ def _table(fields: dict[str, FieldInfo], prefix: str, why: dict[str, str]) -> st
     lines = ["| key | type | allowed | default | what and why |", "| --- | --- | --- | --- | --- |"]
     for field_name, field in fields.items():
         name = field.alias or field_name
-        kind, allowed = _described(field.annotation, list(field.metadata))
+        kind, allowed = described(field.annotation, list(field.metadata))
         allowed = ALLOWED.get(name, allowed)
         reason = why.get(f"{prefix}{name}", "not in the shipped file")
         default = "required" if field.is_required() else f"`{_shown(_default(field))}`"
         cells = [f"`{prefix}{name}`", kind, allowed or "any", default, reason or "-"]
         lines.append("| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |")
     return "\n".join([*lines, ""])
-
-
-def _described(annotation: Any, metadata: list[Any]) -> tuple[str, str]:
-    """Return the type and the allowed values of an annotation in words."""
-    for entry in metadata:
-        if isinstance(entry, Quantity):
-            unit = f", {entry.unit}" if entry.unit else ""
-            return f"number{unit}", f"{entry.lower:g} to {entry.upper:g}"
-    lowest = next((entry.ge for entry in metadata if isinstance(entry, Ge)), None)
-    highest = next((entry.le for entry in metadata if isinstance(entry, Le)), None)
-    if lowest is not None or highest is not None:
-        return _KINDS[annotation], f"{lowest} to {highest}"
-    if annotation in _KINDS:
-        return _KINDS[annotation], ""
-    if _is_model(annotation):
-        return f"block of {', '.join(annotation.model_fields)}", ""
-    return _composed(get_origin(annotation), get_args(annotation))
-
-
-def _composed(origin: Any, parts: tuple[Any, ...]) -> tuple[str, str]:
-    """Return the same for an annotation that is made of others."""
-    if origin is Literal:
-        return "text", ", ".join(f"`{part}`" for part in parts)
-    if origin is Annotated:
-        return _described(parts[0], list(parts[1:]))
-    if origin in (Union, UnionType):
-        kinds = [("null", "") if part is NoneType else _described(part, []) for part in parts]
-        allowed = "; ".join(text for _, text in kinds if text)
-        return " or ".join(kind for kind, _ in kinds), allowed
-    if origin is dict:
-        kind, allowed = _described(parts[1], [])
-        return f"{kind} per name", allowed
-    kind, allowed = _described(parts[0], [])
-    if len(parts) == 1 or parts[1] is Ellipsis:
-        return f"list of {kind}", allowed
-    return kind.replace("number", "[lower, upper]"), allowed
-
-
-def _is_model(annotation: Any) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
 def _default(field: FieldInfo) -> Any:
