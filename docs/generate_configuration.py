@@ -8,20 +8,18 @@ python docs/generate_configuration.py
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+from typing import Any, Final
 
-from annotated_types import Ge, Le
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.inverse.markers import MarkerSet
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematicsConfig
-from pathwalker_cli.io.fields import Quantity, Sides
+from pathwalker_cli.io.commented_yaml import reasons
+from pathwalker_cli.io.described import described, is_model
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.studies.batch.schema import BatchStudy
 from pathwalker_cli.studies.landscape.study import LandscapeStudy
@@ -68,14 +66,6 @@ of `mapd-orthosis.yaml`. Keys of a patient's file are in [patient file](patient-
 *What and why* is the comment that stands beside the key in the shipped file.
 """
 
-_KINDS: Final[dict[Any, str]] = {
-    float: "number",
-    int: "whole number",
-    bool: "true or false",
-    str: "text",
-    Any: "any value",
-}
-
 
 def page() -> str:
     """Return the whole page."""
@@ -83,32 +73,6 @@ def page() -> str:
     for heading, file, model in STUDIES:
         parts += [f"## {heading}: `configs/{file}`\n", *_tables(model, reasons(CONFIGS / file))]
     return "\n".join(parts)
-
-
-def reasons(path: Path) -> dict[str, str]:
-    """Return the comment of every dotted key of a YAML file.
-
-    A comment goes on in the lines below it that hold only a comment, further in than the key.
-    """
-    found: dict[str, str] = {}
-    parents: list[tuple[int, str]] = []
-    key, commented = "", False
-    for line in path.read_text(encoding="utf-8").splitlines():
-        entry = re.match(r"(?P<indent> *)(?P<key>\w+):(?P<rest>.*)$", line)
-        mark = re.search(r"(?:^|\s)#\s?(?P<text>.*)$", line)
-        if entry:
-            indent = len(entry["indent"])
-            parents = [parent for parent in parents if parent[0] < indent]
-            key = ".".join([*(name for _, name in parents), entry["key"]])
-            parents.append((indent, entry["key"]))
-            commented = mark is not None
-            found[key] = mark["text"].strip() if mark else ""
-        elif mark and commented and line.index("#") > parents[-1][0]:
-            text = mark["text"].strip()
-            found[key] += f"; {text}" if re.match(r"\w+: ", text) else f" {text}"
-        else:
-            commented = False
-    return found
 
 
 def _tables(model: type[BaseModel], why: dict[str, str]) -> Iterator[str]:
@@ -144,62 +108,6 @@ def row(key: str, field: FieldInfo, meaning: str) -> str:
     default = "required" if field.is_required() else f"`{_shown(_default(field))}`"
     cells = [f"`{key}`", kind, allowed or "any", default, meaning or "-"]
     return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
-
-
-def described(annotation: Any, metadata: list[Any]) -> tuple[str, str]:
-    """Return the type and the allowed values of an annotation in words."""
-    for entry in metadata:
-        if isinstance(entry, Quantity):
-            unit = f", {entry.unit}" if entry.unit else ""
-            return f"number{unit}", f"{entry.lower:g} to {entry.upper:g}"
-    lowest = next((entry.ge for entry in metadata if isinstance(entry, Ge)), None)
-    highest = next((entry.le for entry in metadata if isinstance(entry, Le)), None)
-    if lowest is not None or highest is not None:
-        return _KINDS[annotation], _between(lowest, highest)
-    if annotation in _KINDS:
-        return _KINDS[annotation], ""
-    if is_model(annotation) and issubclass(annotation, Sides):
-        kind, allowed = described(side_type(annotation), [])
-        return f"{kind}; per side", allowed
-    if is_model(annotation):
-        return f"block of {', '.join(annotation.model_fields)}", ""
-    return _composed(get_origin(annotation), get_args(annotation))
-
-
-def _between(lowest: Any, highest: Any) -> str:
-    """Return a range in words; either end may be open."""
-    if highest is None:
-        return f"{lowest} or more"
-    return f"up to {highest}" if lowest is None else f"{lowest} to {highest}"
-
-
-def _composed(origin: Any, parts: tuple[Any, ...]) -> tuple[str, str]:
-    """Return the same for an annotation that is made of others."""
-    if origin is Literal:
-        return "text", ", ".join(f"`{part}`" for part in parts)
-    if origin is Annotated:
-        return described(parts[0], list(parts[1:]))
-    if origin in (Union, UnionType):
-        kinds = [("null", "") if part is NoneType else described(part, []) for part in parts]
-        allowed = "; ".join(text for _, text in kinds if text)
-        return " or ".join(kind for kind, _ in kinds), allowed
-    if origin is dict:
-        kind, allowed = described(parts[1], [])
-        return f"{kind} per name", allowed
-    kind, allowed = described(parts[0], [])
-    if len(parts) == 1 or parts[1] is Ellipsis:
-        return f"list of {kind}", allowed
-    return kind.replace("number", "[lower, upper]"), allowed
-
-
-def side_type(annotation: type[Sides]) -> Any:
-    """Return the type of the value of one side."""
-    return annotation.__pydantic_generic_metadata__["args"][0]
-
-
-def is_model(annotation: Any) -> bool:
-    """Return whether an annotation is a block of keys."""
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
 def _default(field: FieldInfo) -> Any:

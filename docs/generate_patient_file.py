@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final, get_args, get_origin
 
-from generate_configuration import is_model, row, side_type
+from generate_configuration import row
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from pathwalker_cli.io.described import is_model, side_type
 from pathwalker_cli.io.fields import Sides
 from pathwalker_cli.patient import Patient
 

@@ -115,6 +115,11 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "id_command",
         "Compute joint torques and muscle strengths from recorded gait.",
     ),
+    "init": (
+        "pathwalker_cli.commands.init",
+        "init_command",
+        "Write a folder for a new child: patient, orthosis and configs that explain themselves.",
+    ),
     "doctor": (
         "pathwalker_cli.commands.doctor",
         "doctor_command",

@@ -35,6 +35,7 @@ __all__ = [
     "BOTH",
     "GroundForces",
     "foot_extents",
+    "foot_points",
     "force_columns",
     "ground_forces",
     "plate_direction",
@@ -122,13 +123,19 @@ def ground_forces(
 
 def foot_extents(model: pin.Model, q: np.ndarray) -> dict[Side, np.ndarray]:
     """Return the forward positions of heel and toe [m] per side, each of shape (n, 2)."""
+    found = foot_points(model, q)[:, :, 0]
+    return {"right": found[:, :2], "left": found[:, 2:]}
+
+
+def foot_points(model: pin.Model, q: np.ndarray) -> np.ndarray:
+    """Return right heel and toe, left heel and toe (forward, up) [m] in poses, shape (n, 4, 2)."""
     data: Any = model.createData()
     frames = [model.getFrameId(f"{p}_{SUFFIX[s]}") for s in SIDES for p in ("heel", "toe")]
-    found = np.empty((q.shape[0], len(frames)))
+    found = np.empty((q.shape[0], len(frames), 2))
     for row, pose in enumerate(q):
         pin.framesForwardKinematics(model, data, pose)
-        found[row] = [data.oMf[frame].translation[0] for frame in frames]
-    return {"right": found[:, :2], "left": found[:, 2:]}
+        found[row] = [data.oMf[frame].translation[[0, 2]] for frame in frames]
+    return found
 
 
 def plate_direction(

@@ -15,7 +15,7 @@ from pathwalker_cli.inverse.markers import MarkerPoint
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["MarkerResiduals", "inverse_kinematics", "pelvis_markers"]
+__all__ = ["MarkerResiduals", "inverse_kinematics", "marker_paths", "pelvis_markers"]
 
 TOLERANCE: Final = 1e-8
 """Largest step at which a frame counts as solved [m, rad]: far below what markers resolve."""
@@ -100,6 +100,12 @@ def pelvis_markers(points: tuple[MarkerPoint, ...]) -> tuple[str, ...]:
     """Return the markers on the pelvis, or all if there are none."""
     found = tuple(point.marker for point in points if point.link == "pelvis")
     return found or tuple(point.marker for point in points)
+
+
+def marker_paths(model: pin.Model, points: tuple[MarkerPoint, ...], q: np.ndarray) -> np.ndarray:
+    """Return where the walker's points are (forward, up) [m] in poses (n, 10), (n, points, 2)."""
+    fit = _Fit(model, points)
+    return np.array([fit.positions(pose)[0] for pose in q])
 
 
 class _Fit:

@@ -17,6 +17,7 @@ from pathwalker_cli.errors import DataError
 
 __all__ = [
     "LEAST_FRAMES",
+    "METRES",
     "Event",
     "EventKind",
     "ForcePlate",
@@ -30,7 +31,9 @@ EventKind = Literal["foot_strike", "toe_off"]
 LEAST_FRAMES: Final = 20
 """Frames that the zero-lag filter needs at the ends, and fewer than any step has."""
 
-_METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+"""Length of the units of C3D files [m]."""
+
 _KINDS: Final[dict[str, EventKind]] = {"foot strike": "foot_strike", "foot off": "toe_off"}
 _SIDES: Final[dict[str, Side]] = {"left": "left", "right": "right"}
 
@@ -170,11 +173,11 @@ def _value(parameters: Any, group: str, name: str, path: Path) -> Any:
 def _unit(parameters: Any, path: Path) -> float:
     """Return the length of the file's unit [m]."""
     unit = str(_value(parameters, "POINT", "UNITS", path)[0]).strip().lower()
-    if unit not in _METRES:
+    if unit not in METRES:
         raise DataError(
-            f"marker positions are in '{unit}'", where=str(path), allowed=", ".join(_METRES)
+            f"marker positions are in '{unit}'", where=str(path), allowed=", ".join(METRES)
         )
-    return _METRES[unit]
+    return METRES[unit]
 
 
 def _positions(points: np.ndarray, unit: float) -> np.ndarray:

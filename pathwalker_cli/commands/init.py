@@ -1,0 +1,57 @@
+"""The command `init`: a folder to begin with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+__all__ = ["init_command"]
+
+
+@click.command("init")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option("--id", "name", metavar="NAME", help="Code of the child; name of DIR if left out.")
+@click.option("--age", type=float, metavar="YEARS", help="Age, 4 to 15; 9 if left out.")
+@click.option("--mass", type=float, metavar="KG", help="Body mass; from the age if left out.")
+@click.option("--height", type=float, metavar="M", help="Height; from the age if left out.")
+@click.option("--without-orthosis", is_flag=True, help="Of a child that only walks barefoot.")
+@click.option("--example", is_flag=True, help="Also make C3D recordings of the child, to try all.")
+def init_command(
+    folder: Path,
+    name: str | None,
+    age: float | None,
+    mass: float | None,
+    height: float | None,
+    without_orthosis: bool,
+    example: bool,
+) -> None:
+    """Write a folder for a new child: patient, orthosis and configs that explain themselves.
+
+    The files hold the numbers of a made-up child, so everything runs as it is; every key has a
+    comment with its unit and where to measure it. With --example, C3D files are made too: gait that
+    was recorded of another child, played by the model of the made-up one. DIR must be new or empty.
+    """
+    from pathwalker_cli.starter.child import made_child
+    from pathwalker_cli.starter.files import command_lines, next_steps
+    from pathwalker_cli.starter.folder import write_folder
+
+    child = made_child(name or folder.resolve().name, age, mass, height)
+    worn = not without_orthosis
+    write_folder(folder, child, worn, example)
+    click.echo(
+        f"Wrote {folder}: a made-up child of {child.age:g} years, {child.body_mass:g} kg and "
+        f"{child.height:g} m.\n\nNext:\n"
+    )
+    click.echo(f"{command_lines(f'cd {_quoted(folder)}', 2)}")
+    for step in next_steps(worn, example):
+        click.echo(f"\n{click.wrap_text(step.why, 80, '# ', '# ')}")
+        for command in step.commands:
+            click.echo(command_lines(command, 2))
+
+
+def _quoted(folder: Path) -> str:
+    """Return a path as a shell takes it."""
+    import shlex
+
+    return shlex.quote(str(folder))

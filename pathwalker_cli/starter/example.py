@@ -1,0 +1,220 @@
+"""Recordings of a made-up child: another child's recorded gait, played by its model.
+
+Angles are kept, lengths grow with the legs, times with the square root of that, forces with the
+weight: the two walks are alike dynamically, so that forces fit the motion (Alexander 1989,
+Physiological Reviews 69, 1199-1227).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import CubicSpline
+
+from pathwalker_cli.conventions import SIDES, Condition, Side
+from pathwalker_cli.inverse.cycles import Stance, stances
+from pathwalker_cli.inverse.filters import frame_rate
+from pathwalker_cli.inverse.forces import foot_points
+from pathwalker_cli.inverse.kinematics import marker_paths
+from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set, marker_points
+from pathwalker_cli.inverse.plates import plate_channels
+from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
+from pathwalker_cli.io.c3d_write import write_c3d
+from pathwalker_cli.io.recordings import CompactRecording, read_recording, recording_names
+from pathwalker_cli.model.urdf import pinocchio_model
+from pathwalker_cli.patient import Patient, load_patient
+
+__all__ = ["made_recordings", "write_example"]
+
+SOURCE: Final = "sreenivasa2017-patient"
+"""Whose recordings are played."""
+
+TRIALS: Final = 7
+"""Trials per condition: all barefoot ones in which a stance was measured."""
+
+NOISE: Final = 1e-3
+"""Standard deviation of the noise on every coordinate of a marker [m]."""
+
+_SEED: Final = 2017
+_PER_FRAME: Final = 8
+_DESCRIPTION: Final = "Made by PathWalker from another child's angles and forces; not recorded"
+
+_ASIDE: Final[Mapping[str, float]] = {"r": -0.09, "l": 0.09}
+"""Distance of a leg from the walking plane [m]."""
+
+_PLATE: Final = (0.5, 0.16)
+"""Length and width of a force plate [m]; narrow, so that each carries one foot only."""
+
+_SENSORS: Final = (0.2, 0.06, 0.03)
+"""Distance of its sensors from the centre along and across, and their depth [m]."""
+
+
+@dataclass(frozen=True)
+class _Body:
+    """A child in a condition: the model and the length of the legs [m]."""
+
+    model: pin.Model
+    leg: float
+
+    @classmethod
+    def of(cls, patient: Patient, condition: Condition) -> _Body:
+        legs = [patient.length(name, side) for name in ("thigh", "shank") for side in SIDES]
+        return cls(pinocchio_model(patient, condition), sum(legs) / 2.0)
+
+    @property
+    def mass(self) -> float:
+        """Mass with all that is worn [kg]."""
+        return float(pin.computeTotalMass(self.model))
+
+
+def write_example(folder: Path, patient: Patient, conditions: tuple[Condition, ...]) -> None:
+    """Write C3D files of a made-up child into c3d/barefoot and c3d/orthosis of a folder."""
+    for condition in conditions:
+        place = folder / "c3d" / condition
+        place.mkdir(parents=True)
+        for recording in made_recordings(patient, condition):
+            path = place / f"{recording.name}.c3d"
+            write_c3d(path, recording, description=_DESCRIPTION)
+
+
+def made_recordings(patient: Patient, condition: Condition) -> Iterator[Recording]:
+    """Yield recordings of a patient who walks as another child was recorded.
+
+    Args:
+        patient: Who walks.
+        condition: What is worn.
+    """
+    source = load_patient(SOURCE)
+    child, other = _Body.of(patient, condition), _Body.of(source, condition)
+    points = marker_points(load_marker_set(), patient, condition)
+    noise = np.random.default_rng(_SEED)
+    number = 0
+    for name in recording_names(source, condition):
+        trial = read_recording(source, condition, name)
+        if number < TRIALS and _measured(trial):
+            number += 1
+            played = _played(trial, child, other)
+            yield _recording(f"made-{condition}-{number}", played, child, other, points, noise)
+
+
+def _measured(trial: CompactRecording) -> list[Stance]:
+    """Return the stances of a trial of which the forces are known."""
+    forces = trial.forces
+    if forces is None:
+        return []
+    return [
+        stance
+        for stance in stances(trial.events)
+        if np.isfinite(forces[f"force_{stance.side[0]}_z"][stance.strike : stance.toe_off]).all()
+    ]
+
+
+@dataclass(frozen=True)
+class _Played:
+    """A trial in the time and the poses of another body.
+
+    Args:
+        trial: The trial.
+        rate: Frames per second [1/s].
+        frames: Frame of the trial, with fractions, that each frame shows, shape (n,).
+        q: Poses of the child [m, rad], shape (n, 10).
+        events: Foot strikes and toe-offs in its frames.
+    """
+
+    trial: CompactRecording
+    rate: float
+    frames: np.ndarray
+    q: np.ndarray
+    events: tuple[Event, ...]
+
+
+def _played(trial: CompactRecording, child: _Body, other: _Body) -> _Played:
+    """Return a trial as the child walks it."""
+    size = child.leg / other.leg
+    slower = np.sqrt(size)
+    values, rate = trial.motion.values.copy(), frame_rate(trial.motion)
+    values[:, :2] *= size
+    count = int((len(values) - 1) * slower) + 1
+    frames = np.arange(count) / slower
+    q = CubicSpline(np.arange(len(values)), values)(frames)
+    q[:, 1] -= foot_points(child.model, q)[:, :, 1].min(axis=1).mean()
+    events = tuple(
+        Event(event.side, event.kind, round(event.frame * slower))
+        for event in trial.events
+        if round(event.frame * slower) < count
+    )
+    return _Played(trial, rate, frames, q, events)
+
+
+def _recording(
+    name: str,
+    played: _Played,
+    child: _Body,
+    other: _Body,
+    points: tuple[MarkerPoint, ...],
+    noise: np.random.Generator,
+) -> Recording:
+    paths = marker_paths(child.model, points, played.q)
+    markers = {point.marker: i for i, point in enumerate(points)}
+    positions = np.empty((len(played.q), len(markers), 3))
+    for column, i in enumerate(markers.values()):
+        positions[:, column, [0, 2]] = paths[:, i]
+        positions[:, column, 1] = _ASIDE.get(points[i].link[-2:].removeprefix("_"), 0.0)
+    positions += noise.normal(0.0, NOISE, positions.shape)
+    plates = tuple(
+        _plate(number, stance, played, child, other)
+        for number, stance in enumerate(_measured(played.trial), start=1)
+    )
+    return Recording(
+        name, played.rate, tuple(markers), positions, played.events, plates, _PER_FRAME
+    )
+
+
+def _plate(number: int, stance: Stance, played: _Played, child: _Body, other: _Body) -> ForcePlate:
+    """Return a plate below a stance, with the load of that stance alone."""
+    force, point = _load(stance, played, child, other)
+    middle = float(np.median(point[force[:, 2] > 0.0]))
+    along, across = _PLATE
+    aside = _ASIDE[stance.side[0]]
+    ends = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
+    corners = np.array([[middle + x * along / 2, aside + y * across / 2, 0.0] for x, y in ends])
+    places = np.column_stack([point - middle, np.zeros_like(point)])
+    channels = plate_channels(force, places, *_SENSORS)
+    at = np.arange(len(force) * _PER_FRAME) / _PER_FRAME
+    samples = np.column_stack([np.interp(at, np.arange(len(force)), c) for c in channels.T])
+    return ForcePlate(f"plate {number}", corners, *_SENSORS, samples)
+
+
+def _load(
+    stance: Stance, played: _Played, child: _Body, other: _Body
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return force (n, 3) [N] and its forward position (n,) [m] of one stance, over all frames.
+
+    The centre of pressure lies at the same share of the foot, from heel to toe.
+    """
+    trial, side = played.trial, stance.side
+    assert trial.forces is not None
+    rows = slice(stance.strike, stance.toe_off + 1)
+    known = np.arange(stance.strike, stance.toe_off + 1)
+    heel, toe = _foot(other.model, trial.motion.values[rows], side).T
+    share = (trial.forces[f"cop_{side[0]}_x"][rows] - heel) / (toe - heel)
+    share = np.interp(known, known[np.isfinite(share)], share[np.isfinite(share)])
+    inside = (played.frames >= stance.strike) & (played.frames <= stance.toe_off)
+    force = np.zeros((len(played.q), 3))
+    for axis, name in ((0, "x"), (2, "z")):
+        values = np.nan_to_num(trial.forces[f"force_{side[0]}_{name}"][rows])
+        force[inside, axis] = np.interp(played.frames[inside], known, values)
+    force *= child.mass / other.mass
+    heel, toe = _foot(child.model, played.q, side).T
+    return force, heel + np.interp(played.frames, known, share) * (toe - heel)
+
+
+def _foot(model: pin.Model, q: np.ndarray, side: Side) -> np.ndarray:
+    """Return the forward positions of heel and toe [m], shape (n, 2)."""
+    first = 2 * SIDES.index(side)
+    return foot_points(model, q)[:, first : first + 2, 0]

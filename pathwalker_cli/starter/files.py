@@ -1,0 +1,244 @@
+"""The files of a new folder, from templates and the models that validate them."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from pydantic import BaseModel
+
+from pathwalker_cli.io.described import described, field_at
+from pathwalker_cli.model.proportions import ANKLE_HEIGHT, HEEL_SHARE, TOE_SHARE, default_length
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient_blocks import OrthosisData
+from pathwalker_cli.starter.child import Child
+from pathwalker_cli.starter.comments import WIDTH, comment, commented, unbroken
+from pathwalker_cli.starter.configs import config_files
+
+__all__ = ["EXAMPLE_NOTE", "Step", "command_lines", "explained_keys", "folder_files", "next_steps"]
+
+_LENGTHS: Final = {
+    "pelvis": "Length of the pelvis segment.",
+    "hip_drop": "How far the hip joints lie below the pelvis origin.",
+    "lumbar_height": "How far the lumbar joint lies above the pelvis origin.",
+    "trunk": "Lumbar joint to chin.",
+    "head": "Chin to vertex.",
+    "shoulder_height": "How far the shoulders lie above the lumbar joint.",
+    "upper_arm": "Shoulder to elbow.",
+    "lower_arm": "Elbow to wrist.",
+    "hand": "Wrist to fingertips.",
+}
+"""Lengths that need no measuring, and what they are."""
+
+_SOLE: Final = {"heel": (-0.0432, -0.084), "toe": (0.108, -0.06)}
+"""Sole of the shoe of the shipped patient, in body heights."""
+
+EXAMPLE_NOTE: Final = (
+    "The C3D files are made, not recorded: joint angles and ground forces that were recorded of "
+    "another child (the patient that comes with PathWalker), played by the model of the made-up "
+    "child of this folder, with 1 mm of noise on every marker. They show the way from C3D files "
+    "to springs and say nothing about anybody."
+)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing to do with a folder.
+
+    Args:
+        why: What it is for, a sentence.
+        commands: Commands, from within the folder.
+    """
+
+    why: str
+    commands: tuple[str, ...] = ()
+
+
+def folder_files(child: Child, worn: bool, example: bool) -> dict[str, str]:
+    """Return the texts of a new folder by file name.
+
+    Args:
+        child: The child.
+        worn: Whether there is an orthosis.
+        example: Whether recordings come with it.
+    """
+    files = {"patient.yaml": _patient(child, worn, {})}
+    purposes = {"patient.yaml": "the child: begin here"}
+    if worn:
+        files["orthosis.yaml"] = _orthosis({})
+        purposes["orthosis.yaml"] = "the orthosis and its springs"
+    for file in config_files(worn):
+        files[file.name] = _environment().get_template("config.yaml.j2").render(file=file)
+        purposes[file.name] = file.purpose[0].lower() + file.purpose[1:].split(". ")[0].rstrip(".")
+    if example:
+        purposes["c3d/"] = "made recordings"
+    readme = _environment().get_template("README.txt.j2")
+    steps = next_steps(worn, example)
+    shown = {
+        name: textwrap.fill(text, WIDTH - 26).replace("\n", "\n" + " " * 26)
+        for name, text in purposes.items()
+    }
+    files["README.txt"] = readme.render(
+        child=child, files=shown, steps=steps, example=example, note=EXAMPLE_NOTE
+    )
+    return files
+
+
+def next_steps(worn: bool, example: bool) -> tuple[Step, ...]:
+    """Return what to do with a new folder, one command after the other.
+
+    Args:
+        worn: Whether there is an orthosis.
+        example: Whether recordings come with it.
+    """
+    conditions = ("barefoot", "orthosis") if worn else ("barefoot",)
+    problems = [f"mapd-{condition}" for condition in conditions]
+    imports = tuple(
+        f"pathwalker import c3d/{c} --patient . --condition {c} -o recordings/{c}"
+        for c in conditions
+    )
+    recorded = (
+        Step("Turn the C3D files into joint angles, events and forces.", imports),
+        Step("See how well the markers fit.", ("pathwalker ik inverse-kinematics.yaml",)),
+        Step(
+            "Put strengths and joint ranges from recorded gait into patient.yaml.",
+            ("pathwalker id inverse-dynamics.yaml --update-patient",),
+        ),
+    )
+    fill_in = "Fill in patient.yaml" + (" and orthosis.yaml." if worn else ".")
+    if not example:
+        c3d = "With C3D recordings: put them into c3d/barefoot"
+        c3d += " and c3d/orthosis" if worn else ""
+        recorded = _begun(recorded, f"{c3d}. Without any, go on with step 5.")
+    check = f"pathwalker check patient.yaml {' '.join(f'{name}.yaml' for name in problems)}"
+    solves = tuple(f"pathwalker solve {n} {n}.yaml --out runs/{n}" for n in problems)
+    last = problems[-1]
+    study = (
+        Step("Ask what softer springs change, and which number of the child matters most.", (
+            f"pathwalker perturb perturbation.yaml --run runs/{last}",
+            f"pathwalker sensitivity sensitivity.yaml --run runs/{last}",
+        ))
+        if worn
+        else Step("Ask which number of the child matters most.", (
+            f"pathwalker sensitivity sensitivity.yaml --run runs/{last}",
+        ))
+    )  # fmt: skip
+    return (
+        *(() if example else (Step(fill_in),)),
+        *recorded,
+        Step("See what would be solved, and whether all fits together.", (check,)),
+        Step("Predict the gait" + (" and identify the springs." if worn else "."), solves),
+        study,
+    )
+
+
+def command_lines(command: str, indent: int = 5) -> str:
+    """Return a command for a terminal of 80 columns, its lines joined by backslashes."""
+    margin = " " * indent
+    if len(margin + command) <= WIDTH:
+        return margin + command
+    head, mark, tail = command.rpartition(" -o ")
+    return f"{margin}{head} \\\n{margin}   {mark}{tail}"
+
+
+def _begun(steps: tuple[Step, ...], first: str) -> tuple[Step, ...]:
+    """Return steps of which the first says something else before."""
+    return (Step(f"{first} {steps[0].why}", steps[0].commands), *steps[1:])
+
+
+def explained_keys() -> dict[str, dict[str, str]]:
+    """Return what the templates say of every key of patient and orthosis, by dotted key."""
+    patient: dict[str, str] = {}
+    orthosis: dict[str, str] = {}
+    _patient(Child("child", 9.0, 29.0, 1.31), True, patient)
+    _orthosis(orthosis)
+    return {"patient": patient, "orthosis": orthosis}
+
+
+def _patient(child: Child, worn: bool, told: dict[str, str]) -> str:
+    """Return the text of the patient's file; take note of what is said of each key."""
+    lengths = ("thigh", "shank", "foot")
+    foot = child.length("foot")
+
+    def point(name: str) -> str:
+        share = HEEL_SHARE if name == "heel" else TOE_SHARE
+        return _pair(share * foot, -ANKLE_HEIGHT * child.height)
+
+    return _environment().get_template("patient.yaml.j2").render(
+        child=child,
+        worn=worn,
+        lengths=_LENGTHS,
+        entry=partial(_entry, Patient, told),
+        num=lambda value: f"{value:g}",
+        sides=lambda name: _sides((child.length(name),) * 2) if name in lengths else "",
+        length=lambda name: f"{default_length(name, child.height):g}",
+        point=point,
+        sole=lambda name: _pair(*(share * child.height for share in _SOLE[name])),
+        strength=lambda name: _sides(child.strength(name)),
+    )  # fmt: skip
+
+
+def _orthosis(told: dict[str, str]) -> str:
+    """Return the text of the orthosis' file; take note of what is said of each key."""
+    template = _environment().get_template("orthosis.yaml.j2")
+    return template.render(entry=partial(_entry, OrthosisData, told))
+
+
+def _entry(
+    model: type[BaseModel],
+    told: dict[str, str],
+    place: str,
+    value: str,
+    text: str,
+    given: bool = True,
+    kind: bool = True,
+) -> str:
+    """Return a key with its value, below what it is, its unit and its range."""
+    told[place] = text
+    field = field_at(model, place)
+    known = _unit_and_range(*described(field.annotation, list(field.metadata))) if kind else ""
+    depth, name = place.count("."), place.rpartition(".")[2]
+    return commented(name, value, f"{text} {known}".strip(), depth, given)
+
+
+def _unit_and_range(kind: str, allowed: str) -> str:
+    """Return unit and range of a key, e.g. "[kg], 5 to 150", as a text that does not wrap."""
+    found = re.match(r"(?:number|\[lower, upper\]), (?P<unit>[^;]+?)(?:;| or null|$)", kind)
+    unit = f"[{found['unit']}]" if found else ""
+    return unbroken(", ".join(filter(None, [unit, allowed.replace("`", "")])))
+
+
+def _sides(values: tuple[float, ...]) -> str:
+    """Return one number, or both sides."""
+    if len(set(values)) == 1:
+        return f"{values[0]:g}"
+    return f"{{right: {values[0]:g}, left: {values[1]:g}}}"
+
+
+def _pair(*values: float) -> str:
+    return f"[{', '.join(f'{value:.3f}' for value in values)}]"
+
+
+def _environment() -> Environment:
+    """Return where templates come from; undefined names are errors, blank lines stay as written."""
+    environment = Environment(
+        loader=PackageLoader("pathwalker_cli.starter"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    fill: Mapping[str, Any] = {"fill": lambda text: textwrap.fill(text, WIDTH)}
+    environment.filters |= {
+        **fill,
+        "command": command_lines,
+        "comment": comment,
+        "column": lambda name: f"{name:<26}",
+    }
+    return environment
