@@ -55,10 +55,11 @@ def check_output(path: str | Path) -> None:
     if target.is_dir():
         raise DataError("is a folder", where=str(path), mend="name a file in it")
     if not target.parent.is_dir():
-        raise DataError("no such folder", where=str(target.parent), mend="make it first")
+        what = "cannot be written: its folder does not exist"
+        raise DataError(what, where=str(path), mend="make the folder first")
     if not os.access(target.parent, os.W_OK | os.X_OK):
-        mend = "choose another folder"
-        raise DataError("cannot be written", where=str(target.parent), mend=mend)
+        what = "cannot be written: its folder is protected"
+        raise DataError(what, where=str(path), mend="choose another folder")
 
 
 @contextmanager
