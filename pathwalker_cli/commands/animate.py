@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from pathlib import Path
 
 import click
@@ -28,7 +29,7 @@ _PAGE, _FILMS = ".html", (".gif", ".mp4")
 )
 @click.option(
     "--fps",
-    type=click.FloatRange(1.0, 60.0),
+    type=click.IntRange(1, 60),
     metavar="RATE",
     help="Pictures per second of a film; 25 if left out.",
 )
@@ -39,7 +40,7 @@ _PAGE, _FILMS = ".html", (".gif", ".mp4")
     help="How many times as long as the walk a film takes; 1 if left out.",
 )
 def animate_command(
-    runs: tuple[Path, ...], out: Path, strides: int | None, fps: float | None, slow: float | None
+    runs: tuple[Path, ...], out: Path, strides: int | None, fps: int | None, slow: float | None
 ) -> None:
     """Draw the walker of one run, or of two side by side, as it walks.
 
@@ -52,7 +53,7 @@ def animate_command(
     if out.suffix.lower() == _PAGE:
         _page(runs, out)
     else:
-        _film(runs, out, strides or 1, fps or 25.0, slow or 1.0)
+        _film(runs, out, strides or 1, fps or 25, slow or 1.0)
     click.echo(f"Written to {out}")
 
 
@@ -67,6 +68,8 @@ def _check(runs: tuple[Path, ...], out: Path, options: dict[str, float | None]) 
         raise DataError(
             "is no kind of animation", where=str(out), allowed=", ".join((_PAGE, *_FILMS))
         )
+    if isnan(options["--slow"] or 1.0):
+        raise DataError("is not a number", where="--slow", allowed="from 0.1 to 100")
     given = [name for name, value in options.items() if value is not None]
     if given and out.suffix.lower() == _PAGE:
         raise DataError(

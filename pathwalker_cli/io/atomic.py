@@ -58,8 +58,8 @@ def check_output(path: str | Path) -> None:
         what = f"cannot be written: there is no folder {target.parent}"
         raise DataError(what, where=str(path), mend="make it first, or choose another file")
     if not os.access(target.parent, os.W_OK | os.X_OK):
-        mend = "choose another folder"
-        raise DataError("cannot be written", where=str(target.parent), mend=mend)
+        what = "cannot be written: its folder is protected"
+        raise DataError(what, where=str(path), mend="choose another folder")
 
 
 @contextmanager
