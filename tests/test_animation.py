@@ -377,7 +377,7 @@ def test_refusals(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert "named twice" in refusal("animate", bare, bare, "-o", "page.html")
     assert "solve it again first" in refusal("animate", runs / "broken", "-o", "page.html")
     assert "is no run folder" in refusal("animate", tmp_path, "-o", "page.html")
-    assert "its folder does not exist" in refusal("animate", bare, "-o", "nowhere/page.html")
+    assert "there is no folder" in refusal("animate", bare, "-o", "nowhere/page.html")
     assert "is a folder" in refusal("animate", bare, "-o", make(tmp_path / "folder.html"))
     assert "is not a number" in refusal("animate", bare, "-o", "film.gif", "--slow", "nan")
     for option in ("--strides", "--fps", "--slow"):
