@@ -18,7 +18,7 @@ from pathwalker_cli.output.recorded_files import (
     write_trial,
 )
 
-__all__ = ["write_dynamics", "write_kinematics"]
+__all__ = ["strengths_source", "write_dynamics", "write_kinematics"]
 
 
 def write_kinematics(folder: Path, trials: Sequence[StudyTrial], body_mass: float) -> None:
@@ -60,8 +60,13 @@ def write_dynamics(
     write_stances(folder / "stances.csv", trials)
     if strengths.strengths is not None:
         write_strengths(folder / "strengths.csv", strengths)
-        source = f"inverse dynamics of recorded barefoot gait, method {method}"
+        source = strengths_source(method)
         write_strengths_yaml(folder / "strengths.yaml", strengths.strengths, source)
+
+
+def strengths_source(method: str) -> str:
+    """Return where strengths come from, for the head of their block."""
+    return f"inverse dynamics of recorded barefoot gait, method {method}"
 
 
 def _by_condition(trials: Iterable[StudyTrial]) -> dict[Condition, list[StudyTrial]]:
