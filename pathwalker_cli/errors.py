@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 __all__ = [
     "BackendError",
     "ConfigError",
@@ -10,6 +13,7 @@ __all__ = [
     "NotConvergedError",
     "PathwalkerError",
     "PatientError",
+    "placed",
 ]
 
 
@@ -38,6 +42,17 @@ class InputError(PathwalkerError):
         if mend:
             parts.append(mend)
         super().__init__("; ".join(parts))
+
+
+@contextmanager
+def placed(where: str) -> Iterator[None]:
+    """Put the place of something before the places of all errors about it."""
+    try:
+        yield
+    except InputError as error:
+        inner = error.where
+        place = inner if inner.startswith(where) else f"{where}: {inner}" if inner else where
+        raise type(error)(error.what, where=place, allowed=error.allowed, mend=error.mend) from None
 
 
 class ConfigError(InputError):

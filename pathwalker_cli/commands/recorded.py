@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from pathwalker_cli.inverse.evaluate import Progress, StudyTrial
     from pathwalker_cli.inverse.study import RecordedConfig
+    from pathwalker_cli.inverse.study_tables import StrengthTable
     from pathwalker_cli.patient import Patient
 
     Config = TypeVar("Config", bound=RecordedConfig)
@@ -86,9 +87,20 @@ def ik_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: b
 @click.argument("config", metavar="CONFIG")
 @_OUT
 @_SET
+@click.option(
+    "--update-patient",
+    is_flag=True,
+    help="Put strengths, speed, steps and joint ranges into the patient's file.",
+)
 @_QUIET
-def id_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: bool) -> None:
-    """Compute joint torques, pelvis residuals and muscle strengths from recorded gait."""
+def id_command(
+    config: str, out: Path | None, changes: tuple[str, ...], update_patient: bool, quiet: bool
+) -> None:
+    """Compute joint torques, pelvis residuals and muscle strengths from recorded gait.
+
+    With --update-patient the blocks `strengths` and `recorded` of the patient's file are replaced,
+    or added; everything else in it, comments too, stays as it is.
+    """
     from pathwalker_cli.inverse.evaluate import dynamics_trials
     from pathwalker_cli.inverse.study import load_inverse_dynamics
     from pathwalker_cli.inverse.study_tables import (
@@ -96,8 +108,10 @@ def id_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: b
         strength_table,
         study_warnings,
     )
+    from pathwalker_cli.output.patient_update import require_own_patient
     from pathwalker_cli.output.recorded_study import write_dynamics, write_origin
     from pathwalker_cli.output.recorded_text import residuals_renderable, strengths_renderable
+    from pathwalker_cli.patient import load_patient
 
     def write(folder: Path, trials: Sequence[StudyTrial], patient: Patient) -> _Findings:
         tables = residual_tables(trials, patient, study)
@@ -105,10 +119,32 @@ def id_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: b
         write_dynamics(folder, trials, tables, strengths, patient.body_mass, study.method)
         write_origin(folder, patient, study.method)
         warnings = study_warnings(trials, tables, patient, study.largest_residual)
-        return _Findings(warnings, (residuals_renderable(tables), strengths_renderable(strengths)))
+        shown = (residuals_renderable(tables), strengths_renderable(strengths))
+        changed = _updated(patient, trials, strengths, study.method) if update_patient else ""
+        return _Findings(warnings, shown, changed)
 
     study = load_inverse_dynamics(config, changes)
+    if update_patient:
+        require_own_patient(load_patient(study.patient))
     _study(study, dynamics_trials, write, out or Path("runs", study.study), quiet)
+
+
+def _updated(
+    patient: Patient, trials: Sequence[StudyTrial], table: StrengthTable, method: str
+) -> str:
+    """Put what was found into the patient's file; return a sentence about it."""
+    from pathwalker_cli.output.patient_update import (
+        recorded_blocks,
+        require_own_patient,
+        update_patient,
+    )
+    from pathwalker_cli.output.recorded_study import strengths_source
+
+    path, blocks = require_own_patient(patient), recorded_blocks(patient, trials)
+    update_patient(path, table.strengths, strengths_source(method), blocks)
+    new = ["strengths"] * (table.strengths is not None)
+    new.append(f"recorded gait ({', '.join(blocks)})")
+    return f"Updated {path}: {' and '.join(new)}"
 
 
 @dataclass(frozen=True)
@@ -117,6 +153,7 @@ class _Findings:
 
     warnings: Sequence[str] = ()
     tables: Sequence[RenderableType] = ()
+    changed: str = ""
 
 
 def _study(
@@ -154,6 +191,8 @@ def _study(
     for table in findings.tables:
         console.print(table)
     console.print(f"Written to {out}", soft_wrap=True, markup=False, highlight=False)
+    if findings.changed:
+        console.print(findings.changed, soft_wrap=True, markup=False, highlight=False)
     limit = config.largest_marker_distance
     for warning in (*trial_warnings(trials, patient.height, limit), *findings.warnings):
         click.echo(f"warning: {warning}", err=True)

@@ -42,6 +42,7 @@ __all__ = [
     "imported_trial",
     "kinematics_trials",
     "recorded_trials",
+    "require_trials",
 ]
 
 Progress = Callable[[str], None]
@@ -114,7 +115,7 @@ def dynamics_trials(
     Raises:
         DataError: If there is no trial, a recording cannot be used, or no force is known.
     """
-    _require_trials(config, patient)
+    require_trials(config, patient)
     trials: list[StudyTrial] = []
     for condition in config.conditions:
         if config.source == "c3d":
@@ -268,8 +269,12 @@ def _ground_forces(recording: CompactRecording, judged: tuple[StanceForce, ...])
     return GroundForces(columns.time, force, centre, judged, WalkingPlane(0, 1))
 
 
-def _require_trials(config: InverseDynamicsConfig, patient: Patient) -> None:
-    """Refuse a study without trials, or with names of trials that are not there."""
+def require_trials(config: InverseDynamicsConfig, patient: Patient) -> None:
+    """Refuse a study without trials, or with names of trials that are not there.
+
+    Raises:
+        DataError: If so.
+    """
     there: list[str] = []
     for condition in config.conditions:
         if config.source == "c3d":

@@ -23,6 +23,7 @@ from pathwalker_cli.patient_blocks import Strengths
 
 __all__ = [
     "staged_folder",
+    "strength_lines",
     "write_marker_table",
     "write_residuals",
     "write_stances",
@@ -181,13 +182,20 @@ def write_strengths_yaml(path: Path, strengths: Strengths, source: str) -> None:
         source: Where they come from, one line.
     """
     lines = [f"# Maximum isometric torques [N m]: {source}", "strengths:"]
+    lines += strength_lines(strengths)
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def strength_lines(strengths: Strengths) -> list[str]:
+    """Return what stands below `strengths:` in a patient's file [N m]."""
+    lines = []
     for name, value in strengths.model_dump().items():
         if isinstance(value, dict):
             shown = f"{{right: {value['right']:.4f}, left: {value['left']:.4f}}}"
         else:
             shown = f"{value:.4f}"
         lines.append(f"  {name}: {shown}")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return lines
 
 
 def _write(path: Path, header: list[str], rows: Iterable[Sequence[object]]) -> None:

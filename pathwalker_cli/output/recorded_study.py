@@ -22,7 +22,7 @@ from pathwalker_cli.output.recorded_files import (
 from pathwalker_cli.output.versions import today, versions
 from pathwalker_cli.patient import Patient
 
-__all__ = ["ORIGIN", "write_dynamics", "write_kinematics", "write_origin"]
+__all__ = ["ORIGIN", "strengths_source", "write_dynamics", "write_kinematics", "write_origin"]
 
 ORIGIN: Final = "study.json"
 """File that says whose recorded gait was studied, how and when."""
@@ -67,7 +67,7 @@ def write_dynamics(
     write_stances(folder / "stances.csv", trials)
     if strengths.strengths is not None:
         write_strengths(folder / "strengths.csv", strengths)
-        source = f"inverse dynamics of recorded barefoot gait, method {method}"
+        source = strengths_source(method)
         write_strengths_yaml(folder / "strengths.yaml", strengths.strengths, source)
 
 
@@ -84,6 +84,11 @@ def write_origin(folder: Path, patient: Patient, method: str) -> None:
         "notes": list(patient.notes),
     }
     write_json(folder / ORIGIN, content)
+
+
+def strengths_source(method: str) -> str:
+    """Return where strengths come from, for the head of their block."""
+    return f"inverse dynamics of recorded barefoot gait, method {method}"
 
 
 def _by_condition(trials: Iterable[StudyTrial]) -> dict[Condition, list[StudyTrial]]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.errors import ConfigError, InputError, PatientError
+from pathwalker_cli.errors import ConfigError, InputError, PatientError, placed
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.ocp.gait_bounds import gait_bounds
 from pathwalker_cli.ocp.passage import recorded_passage
@@ -17,7 +15,7 @@ from pathwalker_cli.output.run_folder import warm_start_run
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.variation import varied
 
-__all__ = ["check_case", "check_warm_start"]
+__all__ = ["check_case", "check_patient", "check_warm_start"]
 
 
 def check_case(name: str, config: StudyConfig, patient: Patient, where: str) -> None:
@@ -32,8 +30,9 @@ def check_case(name: str, config: StudyConfig, patient: Patient, where: str) -> 
     Raises:
         InputError: If the patient lacks what the problem needs, or a value does not fit.
     """
-    with _named(f"{where}, case {name}"):
-        _check_needs(config, patient)
+    with placed(f"{where}, case {name}"):
+        check_patient(config, patient)
+        _check_starts(config)
         model = config.model
         changed = varied(patient, config.variation)
         walker = build_walker(changed, config.condition, model.published, model.backend)
@@ -41,18 +40,27 @@ def check_case(name: str, config: StudyConfig, patient: Patient, where: str) -> 
         _check_start(config, walker)
 
 
-def _check_needs(config: StudyConfig, patient: Patient) -> None:
-    """Refuse a patient without what the problem needs, and a config for several processes.
+def check_patient(config: StudyConfig, patient: Patient) -> None:
+    """Refuse a patient without what the problem needs.
 
     Raises:
-        InputError: If so.
+        PatientError: If orthosis or strengths lack.
     """
     if config.condition == "orthosis" and patient.orthosis is None:
         raise PatientError(
             f"patient {patient.id} has no orthosis, which problem {config.problem} needs",
             where=str(patient.source),
-            mend="add the orthosis to the file, or list patient and problem in another study",
+            mend="add the orthosis to the file, or choose a barefoot problem for this patient",
         )
+    _ = patient.max_isometric_torque
+
+
+def _check_starts(config: StudyConfig) -> None:
+    """Refuse a config for several processes.
+
+    Raises:
+        ConfigError: If so.
+    """
     if config.starts > 1:
         raise ConfigError(
             f"is {config.starts}",
@@ -60,7 +68,6 @@ def _check_needs(config: StudyConfig, patient: Patient) -> None:
             allowed="1, as the cores belong to the cases",
             mend="spread the starts as cases, e.g. grid: {start.knee_flexion: [0.5, 0.7, 0.9]}",
         )
-    _ = patient.max_isometric_torque
 
 
 def _check_start(config: StudyConfig, walker: Walker) -> None:
@@ -82,15 +89,8 @@ def check_warm_start(folder: Path, config: StudyConfig, where: str) -> None:
     Raises:
         InputError: If it is missing, damaged, not converged or about something else.
     """
-    with _named(where):
-        warm_start_run(folder, config)
-
-
-@contextmanager
-def _named(where: str) -> Iterator[None]:
-    """Put the place of a case before the place of an error."""
     try:
-        yield
+        warm_start_run(folder, config)
     except InputError as error:
         inner = error.where.removeprefix("--warm-start").strip()
         place = f"{where}: {inner}" if inner else where

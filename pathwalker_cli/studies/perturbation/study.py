@@ -25,7 +25,7 @@ from pathwalker_cli.studies.measures import measures
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed, remark
 from pathwalker_cli.studies.springs import Ranges, Spring, ends, free_springs, spring_ranges
 
-__all__ = ["PerturbationStudy", "perturb"]
+__all__ = ["PerturbationStudy", "moved_springs", "perturb"]
 
 POINTS: Final = "points"
 """Folder of the solved neighbours."""
@@ -89,6 +89,26 @@ def perturb(
     )
 
 
+def moved_springs(study: PerturbationStudy, free: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the springs that a study moves.
+
+    Args:
+        study: The study.
+        free: Springs that its problem may choose.
+
+    Raises:
+        ConfigError: If one is prescribed.
+    """
+    for spring in study.springs:
+        if spring not in free:
+            raise ConfigError(
+                f"{spring} is prescribed by the problem and has no optimum",
+                where="springs",
+                allowed=", ".join(free) or "none: the problem prescribes all springs",
+            )
+    return study.springs or free
+
+
 _Point = tuple[float, float, StudyConfig]
 """Factor, stiffness [N m/rad] and config of a neighbour."""
 
@@ -97,15 +117,8 @@ def _plan(
     study: PerturbationStudy, config: StudyConfig, base: Mapping[str, float], ranges: Ranges
 ) -> list[tuple[str, list[_Point]]]:
     """Return the neighbours by spring, nearest ones first."""
-    free = free_springs(ranges)
     plan = []
-    for spring in study.springs or free:
-        if spring not in free:
-            raise ConfigError(
-                f"{spring} is prescribed by the problem and has no optimum",
-                where="springs",
-                allowed=", ".join(free) or "none: the problem prescribes all springs",
-            )
+    for spring in moved_springs(study, free_springs(ranges)):
         points = []
         for factor in sorted(study.factors, key=lambda factor: abs(np.log(factor))):
             # rounded, so that a restart on another machine asks for the very same number

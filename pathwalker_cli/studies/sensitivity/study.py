@@ -24,7 +24,7 @@ from pathwalker_cli.studies.journal import Journal
 from pathwalker_cli.studies.measures import all_measures, measures
 from pathwalker_cli.studies.sensitivity.result import Check, Sensitivities, Sensitivity
 
-__all__ = ["SensitivityStudy", "default_places", "sensitivities"]
+__all__ = ["SensitivityStudy", "asked_places", "default_places", "sensitivities"]
 
 POINTS: Final = "points"
 """Folder of the re-solves of a check."""
@@ -67,6 +67,21 @@ def default_places(patient: Patient, worn: bool) -> tuple[str, ...]:
     return (*places, "body_mass", *(f"segment_lengths.{n}" for n in SegmentLengths.model_fields))
 
 
+def asked_places(
+    asked: SensitivityStudy, springs: tuple[str, ...], patient: Patient, worn: bool
+) -> tuple[str, ...]:
+    """Return the numbers that a study asks about: free springs and places in the patient's file.
+
+    Raises:
+        ConfigError: If a check is asked for what is not asked about.
+    """
+    places = (*springs, *(asked.places or default_places(patient, worn)))
+    unknown = [place for place in asked.check if place not in places]
+    if unknown:
+        raise ConfigError(f"names {unknown[0]}", where="check", allowed=", ".join(places))
+    return places
+
+
 def sensitivities(asked: SensitivityStudy, run: Run, folder: Path) -> Sensitivities:
     """Return the sensitivities of an optimum.
 
@@ -86,10 +101,7 @@ def sensitivities(asked: SensitivityStudy, run: Run, folder: Path) -> Sensitivit
     began = time.perf_counter()
     patient = around.optimum.solver.walker.patient
     worn = config.condition == "orthosis"
-    places = (*around.springs, *(asked.places or default_places(patient, worn)))
-    unknown = [place for place in asked.check if place not in places]
-    if unknown:
-        raise ConfigError(f"names {unknown[0]}", where="check", allowed=", ".join(places))
+    places = asked_places(asked, around.springs, patient, worn)
     base = all_measures(around.optimum)
     rows = tuple(_sensitivity(around, place, base) for place in places)
     seconds = time.perf_counter() - began

@@ -25,7 +25,7 @@ from pathwalker_cli.studies.neighbours import Neighbours, motion_signature
 from pathwalker_cli.studies.run import RunLog, is_done
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
-__all__ = ["TradeoffStudy", "chain", "tradeoff_of"]
+__all__ = ["TradeoffStudy", "chain", "require_prediction", "tradeoff_of"]
 
 ROOT: Final = "base"
 """Name of the run that everything begins with."""
@@ -77,9 +77,7 @@ def tradeoff_of(
         ConfigError: If the base is no prediction.
         NotConvergedError: If the user stopped it.
     """
-    if run.config.fits:
-        raise ConfigError(f"is {run.config.problem}, which follows a recording", where="base",
-                          allowed="a prediction, e.g. mapd-orthosis")  # fmt: skip
+    require_prediction(run.config)
     near = Neighbours(run, folder / "points", study.max_iterations, tell)
     base = run.config.cost.walking_speed_weight
     solve = near.solver(lambda values: with_weight(run.config, values))
@@ -94,6 +92,17 @@ def tradeoff_of(
     points = [refined.point(each) if study.refine and each.inaccurate else each.point()
               for each in checked]  # fmt: skip
     return _result(near, found, tuple(points), refined.seconds)
+
+
+def require_prediction(config: StudyConfig) -> None:
+    """Refuse a problem that follows a recording.
+
+    Raises:
+        ConfigError: If it does.
+    """
+    if config.fits:
+        raise ConfigError(f"is {config.problem}, which follows a recording", where="base",
+                          allowed="a prediction, e.g. mapd-orthosis")  # fmt: skip
 
 
 def with_weight(config: StudyConfig, values: Values) -> StudyConfig:

@@ -1,0 +1,97 @@
+"""How long a solve may take: measured seconds of the shipped patient, by unknowns.
+
+Iterations and CPU seconds are those of docs/performance.md, "Whole solves", with derivatives cached.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from pathwalker_cli.config import StudyConfig
+
+__all__ = ["FIXED", "MEASURED", "Measured", "Seconds", "expected"]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One measured solve.
+
+    Args:
+        iterations: Iterations in all.
+        seconds: CPU seconds from the shell, imports, tables and figures included.
+    """
+
+    iterations: int
+    seconds: float
+
+
+MEASURED: Final[dict[str, tuple[Measured, Measured]]] = {
+    "mapd-barefoot": (Measured(183, 12.5), Measured(222, 12.4)),
+    "mapd-healthy": (Measured(145, 10.5), Measured(162, 9.3)),
+    "mapd-orthosis": (Measured(271, 17.7), Measured(388, 22.2)),
+    "mapd-ws-orthosis": (Measured(319, 20.3), Measured(585, 38.3)),
+    "ls-barefoot": (Measured(69, 7.8), Measured(127, 10.0)),
+}
+"""By problem: on 64 intervals without refinement, and refined from 48 intervals on."""
+
+FIXED: Final = 4.0
+"""CPU seconds of imports, figures and tables, whatever is solved."""
+
+_INTERVALS: Final = (64, 48)
+"""Intervals that the two measured solves began with."""
+
+_SPREAD: Final = (0.7, 2.0)
+"""Shares of the measured iterations between which other children and starts end: those of the
+tests' ten-year-old are 1.6 times those of the shipped patient, other starts need up to 1.9."""
+
+_VERDICT: Final = 2.0
+"""Factor by which judging the springs makes a solve with orthoses longer."""
+
+
+@dataclass(frozen=True)
+class Seconds:
+    """CPU seconds on the machine of docs/performance.md.
+
+    Args:
+        likely: As the shipped patient would take.
+        least: Few iterations.
+        most: Many iterations.
+        iterations: Iterations that `likely` stands for.
+    """
+
+    likely: float
+    least: float
+    most: float
+    iterations: int
+
+    def __str__(self) -> str:
+        """Say it for people."""
+        return (
+            f"about {self.likely:.0f} s ({self.least:.0f} to {self.most:.0f}) of one core on the "
+            "machine of docs/performance.md"
+        )
+
+
+def expected(config: StudyConfig, intervals: int, unknowns: int) -> Seconds:
+    """Return how long a solve may take.
+
+    Args:
+        config: The study.
+        intervals: Intervals of its first mesh.
+        unknowns: Unknowns on that mesh.
+    """
+    refined = config.mesh.refinements > 0
+    measured = MEASURED[config.problem][refined]
+    # unknowns per interval are those of the problem; more of them on a finer mesh, or of a
+    # higher degree, make an iteration longer in proportion
+    degrees = config.mesh.degree / 3.0
+    size = degrees * intervals / _INTERVALS[refined]
+    verdict = _VERDICT if config.verdict and config.condition == "orthosis" else 1.0
+    solve = (measured.seconds - FIXED) * size * config.starts * verdict
+    return Seconds(
+        FIXED + solve,
+        FIXED + _SPREAD[0] * solve,
+        FIXED + _SPREAD[1] * solve,
+        measured.iterations * config.starts,
+    )

@@ -1,0 +1,267 @@
+"""A config of one problem: everything that a solve would read, without the solve."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pathwalker_cli.checking.expect import expected
+from pathwalker_cli.checking.report import Checked, Row
+from pathwalker_cli.checking.sense import contradictions, oddities
+from pathwalker_cli.config import StudyConfig, load_config, study_patient
+from pathwalker_cli.conventions import CONDITIONS, STIFFNESSES
+from pathwalker_cli.errors import DataError, placed
+from pathwalker_cli.io.recordings import recording_names
+from pathwalker_cli.model.healthy import healthy_strength
+from pathwalker_cli.ocp import mesh as meshing
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.solve import GaitSolver
+from pathwalker_cli.output.run_folder import ENTRIES, check_target
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient_blocks import Strengths
+from pathwalker_cli.studies.batch.checks import check_patient
+
+__all__ = ["check_prediction", "patient_rows", "ready_solver"]
+
+
+def check_prediction(path: str, problem: str = "") -> Checked:
+    """Return what a solve of a config would do.
+
+    Args:
+        path: The config, a file or the name of a shipped one.
+        problem: Problem that it must be of.
+
+    Raises:
+        InputError: The first thing that is wrong.
+    """
+    config = load_config(path, problem)
+    solver = ready_solver(config, path)
+    return described(solver, path)
+
+
+def ready_solver(config: StudyConfig, where: str) -> GaitSolver:
+    """Return the solver of a config, with everything checked that needs no solve.
+
+    Args:
+        config: The config.
+        where: Its file, for messages.
+
+    Raises:
+        InputError: The first thing that is wrong.
+    """
+    with placed(where):
+        check_patient(config, study_patient(config))
+        solver = GaitSolver(config)
+        _ = solver.stride
+        for error in contradictions(solver):
+            raise error
+    return solver
+
+
+def described(solver: GaitSolver, path: str) -> Checked:
+    """Return what a solver would solve."""
+    config, walker = solver.config, solver.walker
+    patient = walker.patient
+    durations = solver.stride.durations[: len(solver.gait.phases)]
+    program = CollocationProgram(
+        solver.blocks, solver.prediction, meshing.first(durations, config.mesh)
+    )
+    intervals = sum(len(mesh) - 1 for mesh in program.meshes)
+    unknowns, rows = program.program.size, program.program.rows
+    seconds = expected(config, intervals, unknowns)
+    weights = _weights(solver)
+    names = [phase.name for phase in solver.gait.phases]
+    springs = _free_springs(solver)
+    shooting = config.transcription == "multiple-shooting"
+    folder = Path("runs") / f"{config.problem}-{patient.id}"
+    recordings = {c: recording_names(patient, c) for c in CONDITIONS}
+    changed = _changed(config)
+    bounds = _bounds(solver)
+    table: list[Row] = [
+        ("problem", f"{config.problem}, {walker.condition}"),
+        *patient_rows(patient),
+        ("phases", f"{len(names)}: {', '.join(names)}"),
+        ("start", solver.stride.name + (f", {config.starts} starts" * (config.starts > 1))),
+        (
+            "size",
+            f"{intervals} intervals of degree {config.mesh.degree} to begin with, {unknowns:,} "
+            f"unknowns, {rows:,} rows, {_count(len(springs), 'free stiffness', 'es')}",
+        ),
+        *(("bounds", f"{name}: {text}") for name, text in bounds.items()),
+        *(("cost, weights", f"{name.replace('_', ' ')}: {value:g}") for name, value in weights),
+        ("not the default", "; ".join(f"{k}: {v}" for k, v in changed.items()) or "nothing"),
+        ("recordings", _recordings(recordings)),
+        ("output", _output(folder)),
+        ("expected time", str(seconds) + ("; shooting takes minutes more" if shooting else "")),
+    ]
+    content: dict[str, Any] = {
+        "problem": config.problem,
+        "condition": walker.condition,
+        "patient": patient_content(patient),
+        "phases": names,
+        "start": solver.stride.name,
+        "starts": config.starts,
+        "intervals": intervals,
+        "unknowns": unknowns,
+        "rows": rows,
+        "free_parameters": springs,
+        "bounds": bounds,
+        "cost_weights": dict(weights),
+        "not_default": changed,
+        "recordings": {condition: list(found) for condition, found in recordings.items()},
+        "output": str(folder),
+        "output_state": _output(folder),
+        "expected_seconds": {
+            "likely": round(seconds.likely, 1),
+            "least": round(seconds.least, 1),
+            "most": round(seconds.most, 1),
+        },
+    }
+    notes = (*oddities(solver), *patient.notes)
+    return Checked(path, "prediction", tuple(table), content, notes)
+
+
+def patient_rows(patient: Patient) -> list[Row]:
+    """Return who a patient is."""
+    source = f", {patient.source}" if patient.source else ""
+    rows = [
+        ("patient", f"{patient.id}{source}"),
+        (
+            "",
+            f"{patient.sex}, {patient.age:g} years, {patient.body_mass:g} kg, {patient.height:g} m",
+        ),
+    ]
+    shares = strength_shares(patient)
+    sides = [
+        f"{name.replace('_', ' ')} {' / '.join(f'{100 * share:.0f}' for share in values)} %"
+        for name, values in shares.items()
+    ]
+    if sides:
+        text = "right / left, of a healthy child of this mass and height: "
+        rows.append(("strengths", text + ", ".join(sides)))
+    return rows
+
+
+def patient_content(patient: Patient) -> dict[str, Any]:
+    """Return who a patient is as plain values."""
+    return {
+        "id": patient.id,
+        "file": str(patient.source) if patient.source else None,
+        "sex": patient.sex,
+        "age": patient.age,
+        "body_mass": patient.body_mass,
+        "height": patient.height,
+        "strengths_of_healthy": {k: list(v) for k, v in strength_shares(patient).items()},
+    }
+
+
+def strength_shares(patient: Patient) -> dict[str, tuple[float, ...]]:
+    """Return strengths as shares of a healthy child's of the same size: right and left, or one."""
+    if patient.strengths is None:
+        return {}
+    found = {}
+    for name in Strengths.model_fields:
+        given = getattr(patient.strengths, name)
+        values = (given,) if isinstance(given, float) else (given.right, given.left)
+        whole = healthy_strength(name, patient.body_mass, patient.height)
+        found[name] = tuple(round(value / whole, 3) for value in values)
+    return found
+
+
+def _weights(solver: GaitSolver) -> list[tuple[str, float]]:
+    """Return the terms of the objective with their weights; those without any are left out."""
+    weights = {name: value for name, value in vars(solver.weights).items() if name != "goals"}
+    if not solver.config.fits:
+        weights |= {"fit": 0.0, "excitation": 0.0}
+    named = {
+        "effort": "effort per distance",
+        "rate": "activation rates per distance",
+        "acceleration": "accelerations per distance",
+        "walking_speed": "reward for walking speed",
+        "fit": "squared distance from the recording",
+        "excitation": "squared excitations",
+    }
+    terms = [(named.get(name, name), value) for name, value in weights.items() if value]
+    return [*terms, *((f"goal {n}", v) for n, v in solver.config.cost.goals.items() if v)]
+
+
+def _free_springs(solver: GaitSolver) -> list[str]:
+    """Return the stiffnesses that are sought."""
+    if solver.walker.orthosis is None:
+        return []
+    lower, upper = solver.bounds.table.arrays(STIFFNESSES)
+    return [n for n, a, b in zip(STIFFNESSES, lower, upper, strict=True) if a < b]
+
+
+def _bounds(solver: GaitSolver) -> dict[str, str]:
+    """Return every bound with its reason; equal phase durations stand together."""
+    config = solver.config.bounds
+    found: dict[str, str] = {}
+    durations: dict[str, list[str]] = {}
+    for name, text in solver.bounds.sources.items():
+        if name.startswith("duration of "):
+            durations.setdefault(text, []).append(name.removeprefix("duration of "))
+        else:
+            found[name] = text
+    for text, names in durations.items():
+        key = "every phase" if len(durations) == 1 else ", ".join(names)
+        found[f"duration of {key}"] = text
+    found["distance"] = f"[{config.distance[0]:g}, {config.distance[1]:g}] m per stride, config"
+    found["joint speed"] = f"up to {config.joint_speed:g} rad/s, m/s, config"
+    found["friction"] = f"forward force up to {config.friction:g} times the vertical, config"
+    found["vertical force"] = f"at least {config.least_vertical_force:g} N per point, config"
+    found["height of points in the air"] = f"at least {config.least_height:g} m, config"
+    found["activations, excitations"] = "[0, 1], always"
+    return found
+
+
+def _changed(config: StudyConfig) -> dict[str, str]:
+    """Return the settings that differ from the defaults of the problem."""
+    plain = StudyConfig(problem=config.problem, patient=config.patient)
+    now, usual = _flat(config.model_dump(mode="json")), _flat(plain.model_dump(mode="json"))
+    return {
+        key: f"{_short(value)} (default {_short(usual[key])})"
+        for key, value in now.items()
+        if usual.get(key) != value
+    }
+
+
+def _flat(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings of all blocks by dotted key."""
+    found = {}
+    for block, value in content.items():
+        if isinstance(value, Mapping) and block in StudyConfig.model_fields:
+            found |= {f"{block}.{key}": entry for key, entry in value.items()}
+        else:
+            found[block] = value
+    return found
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{k}: {_short(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_short, value)) + "]"
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    return str(value)
+
+
+def _recordings(found: Mapping[str, tuple[str, ...]]) -> str:
+    there = [f"{len(names)} {condition}" for condition, names in found.items() if names]
+    return f"{', '.join(there)}, beside the patient's file" if there else "none"
+
+
+def _output(folder: Path) -> str:
+    """Return where `solve` would write, and whether it can."""
+    try:
+        target = check_target(folder)
+    except DataError as error:
+        return f"{folder} cannot be used: {error.what}; name another folder by --out"
+    holds = target.exists() and bool({path.name for path in target.iterdir()} & ENTRIES)
+    return f"{folder}, {'replaces the run that is there' if holds else 'a new folder'}"
+
+
+def _count(number: int, name: str, ending: str) -> str:
+    return f"{number} {name}{ending if number != 1 else ''}"

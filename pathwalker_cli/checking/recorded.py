@@ -1,0 +1,130 @@
+"""Files about recorded gait and about the patient, and what they hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pathwalker_cli.checking.prediction import patient_content, patient_rows
+from pathwalker_cli.checking.report import Checked, Row
+from pathwalker_cli.conventions import CONDITIONS
+from pathwalker_cli.errors import ConfigError, placed
+from pathwalker_cli.inverse.evaluate import require_trials
+from pathwalker_cli.inverse.markers import MarkerSet, load_marker_set, marker_points
+from pathwalker_cli.inverse.study import (
+    InverseDynamicsConfig,
+    RecordedConfig,
+    load_inverse_dynamics,
+    load_inverse_kinematics,
+)
+from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording
+from pathwalker_cli.io.recordings import read_recording, recording_names
+from pathwalker_cli.io.yaml_file import load_yaml
+from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.patient import OrthosisData, Patient, load_patient
+
+__all__ = [
+    "check_dynamics",
+    "check_kinematics",
+    "check_markers",
+    "check_orthosis",
+    "check_patient_file",
+]
+
+
+def check_kinematics(path: str) -> Checked:
+    """Return what `ik` would do."""
+    config = load_inverse_kinematics(path)
+    with placed(path):
+        patient = load_patient(config.patient)
+        found = _c3d(config, patient)
+    return _recorded(path, "inverse kinematics", patient, found, "C3D files")
+
+
+def check_dynamics(path: str) -> Checked:
+    """Return what `id` would do."""
+    config: InverseDynamicsConfig = load_inverse_dynamics(path)
+    with placed(path):
+        patient = load_patient(config.patient)
+        require_trials(config, patient)
+        if config.source == "c3d":
+            found = _c3d(config, patient)
+            return _recorded(path, "inverse dynamics", patient, found, "C3D files")
+        found = {c: list(recording_names(patient, c)) for c in config.conditions}
+        for condition in config.conditions:
+            for name in found[condition]:
+                read_recording(patient, condition, name)
+    return _recorded(path, "inverse dynamics", patient, found, "recordings beside the patient")
+
+
+def check_markers(path: str) -> Checked:
+    """Return what a marker set holds."""
+    found: MarkerSet = load_marker_set(path)
+    with placed(path):
+        patient = load_patient("sreenivasa2017-patient")
+        points = {c: marker_points(found, patient, c) for c in CONDITIONS}
+    rows: list[Row] = []
+    for condition, own in points.items():
+        markers = list(dict.fromkeys(point.marker for point in own))
+        text = f"{len(markers)} markers at {len(own)} points: {', '.join(markers)}"
+        rows.append((condition, text))
+    names = {c: sorted({point.marker for point in own}) for c, own in points.items()}
+    return Checked(path, "marker set", tuple(rows), {"markers": names})
+
+
+def check_patient_file(path: str) -> Checked:
+    """Return who a patient is; the models of both conditions are built."""
+    patient = load_patient(path)
+    conditions = CONDITIONS if patient.orthosis else CONDITIONS[:1]
+    with placed(path):
+        if patient.strengths is not None:
+            for condition in conditions:
+                build_walker(patient, condition)
+    recordings = {c: recording_names(patient, c) for c in CONDITIONS}
+    rows = [
+        *patient_rows(patient),
+        ("orthosis", _orthosis(patient.orthosis) if patient.orthosis else "none"),
+        ("recorded", ", ".join(patient.recorded) or "nothing"),
+        ("recordings", ", ".join(f"{len(n)} {c}" for c, n in recordings.items() if n) or "none"),
+    ]
+    content = {"patient": patient_content(patient), "orthosis": patient.orthosis is not None}
+    missing = ["strengths are not given: nothing can be predicted yet"] * (
+        patient.strengths is None
+    )
+    return Checked(path, "patient", tuple(rows), content, (*missing, *patient.notes))
+
+
+def check_orthosis(path: str) -> Checked:
+    """Return what an orthosis is."""
+    found = load_yaml(path, OrthosisData, ConfigError)
+    return Checked(path, "orthosis", (("orthosis", _orthosis(found)),), {})
+
+
+def _orthosis(found: OrthosisData) -> str:
+    real = found.stiffness_range
+    return (
+        f"{found.mass.shank + found.mass.foot:g} kg per leg, K_D {real.dorsiflexion[0]:g} to "
+        f"{real.dorsiflexion[1]:g}, K_P {real.plantarflexion[0]:g} to {real.plantarflexion[1]:g} "
+        f"N m/rad ({real.source})"
+    )
+
+
+def _c3d(config: RecordedConfig, patient: Patient) -> dict[str, list[str]]:
+    """Return the C3D files of a study by condition, each looked into."""
+    markers = load_marker_set(config.markers)
+    found: dict[str, list[str]] = {}
+    for condition in config.recorded_conditions:
+        names = [point.marker for point in marker_points(markers, patient, condition)]
+        paths = c3d_files(config.c3d.of(condition))
+        for file in paths:
+            checked_recording(file, names, patient.height)
+        found[condition] = [file.stem for file in paths]
+    return found
+
+
+def _recorded(
+    path: str, kind: str, patient: Patient, found: dict[str, list[str]], where: str
+) -> Checked:
+    rows = [*patient_rows(patient)]
+    rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in found.items() if n]
+    content: dict[str, Any] = {"patient": patient_content(patient), "trials": found}
+    return Checked(path, kind, tuple(rows), content, patient.notes)

@@ -1,0 +1,187 @@
+"""Values that are allowed one by one and make no sense together.
+
+What is certain to fail is refused; what is merely unusual becomes a note.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.ocp.solve import GaitSolver
+
+__all__ = ["contradictions", "oddities"]
+
+_ANGLES = COORDINATES[2:]
+
+
+def contradictions(solver: GaitSolver) -> Iterator[ConfigError]:
+    """Yield what no solution can meet."""
+    if not solver.config.fits:
+        yield from _speed(solver)
+        yield from _distance(solver)
+    yield from _flat_feet(solver)
+    yield from _springs(solver)
+
+
+def oddities(solver: GaitSolver) -> Iterator[str]:
+    """Yield sentences about what is allowed and probably not meant."""
+    yield from _partly_real_springs(solver)
+    yield from _start_springs(solver)
+    yield from _start_angles(solver)
+    yield from _comfort(solver)
+
+
+def longest_stride(solver: GaitSolver) -> float:
+    """Return a length that no stride exceeds [m]: two steps with both legs stretched flat."""
+    patient, walker = solver.walker.patient, solver.walker
+    legs = sum(patient.length(name, side) for name in ("thigh", "shank") for side in SIDES)
+    points = patient.contacts(walker.condition)
+    soles = sum(math.hypot(*p) for side in SIDES for p in (points[side].heel, points[side].toe))
+    return 2.0 * (legs + soles)
+
+
+def _speed(solver: GaitSolver) -> Iterator[ConfigError]:
+    table = solver.bounds.table.entries
+    least = table[("walking_speed",)][0]
+    time = sum(table[("duration", p.name)][0] for p in solver.gait.phases)
+    time *= 2.0 if solver.config.half_cycle else 1.0
+    distance = min(table[("distance",)][1], longest_stride(solver))
+    if least * time > distance:
+        yield ConfigError(
+            f"is {least:.3g} m/s, but a stride of at most {distance:.3g} m takes at least "
+            f"{time:.3g} s, the sum of the shortest phases",
+            where="bounds.least_walking_speed",
+            allowed=f"up to {distance / time:.3g} m/s",
+            mend="lower it, or change bounds.distance, phase_duration or phase_durations",
+        )
+
+
+def _distance(solver: GaitSolver) -> Iterator[ConfigError]:
+    shortest, most = solver.config.bounds.distance[0], longest_stride(solver)
+    if shortest > most:
+        yield ConfigError(
+            f"begins at {shortest:.3g} m per stride, longer than both legs of "
+            f"{solver.walker.patient.id} reach in two steps",
+            where="bounds.distance",
+            allowed=f"a lower end of up to {most:.3g} m",
+        )
+
+
+def _flat_feet(solver: GaitSolver) -> Iterator[ConfigError]:
+    """Yield an error for each foot that joint ranges let stand flat nowhere."""
+    table = solver.bounds.table.entries
+    base = np.zeros(len(COORDINATES))
+    for side in SIDES:
+        pitch = _pitch(solver, base, side)
+        names, slopes = [], []
+        for name in _ANGLES:
+            moved = base.copy()
+            moved[COORDINATES.index(name)] = 0.1
+            slope = round((_pitch(solver, moved, side) - pitch) / 0.1)
+            if slope:
+                names.append(name)
+                slopes.append(slope)
+        ends = [
+            sorted(slope * end for end in table[(name,)])
+            for name, slope in zip(names, slopes, strict=True)
+        ]
+        low, high = pitch + sum(a for a, _ in ends), pitch + sum(b for _, b in ends)
+        if not low <= 0.0 <= high:
+            yield ConfigError(
+                f"let the sole of the {side} foot never lie flat: its pitch stays within "
+                f"[{low:.2f}, {high:.2f}] rad over the ranges of {', '.join(names)}",
+                where="bounds.joint_ranges",
+                mend="widen one of them so that 0 is within; zero pose and signs are in "
+                "docs/conventions.md",
+            )
+
+
+def _pitch(solver: GaitSolver, q: np.ndarray, side: str) -> float:
+    """Return the pitch of a sole [rad]: 0 if it lies flat, + if the toe is lower."""
+    points = solver.walker.contact_points(q)
+    first = 2 * ("right", "left").index(side)
+    forward, up = points[first + 1] - points[first]
+    return -math.atan2(up, forward)
+
+
+def _real_range(solver: GaitSolver, name: str) -> tuple[float, float]:
+    real = solver.walker.patient.require_orthosis().stiffness_range
+    low, high = getattr(real, name.split("_")[0])
+    return float(low), float(high)
+
+
+def _springs(solver: GaitSolver) -> Iterator[ConfigError]:
+    if solver.walker.orthosis is None:
+        return
+    for name in STIFFNESSES:
+        low, high = solver.bounds.table.entries[(name,)]
+        least, most = _real_range(solver, name)
+        if low > most or high < least:
+            yield ConfigError(
+                f"is [{low:g}, {high:g}] N m/rad for {name}, where there is no real spring",
+                where=_spring_key(solver, name),
+                allowed=f"within {least:g} to {most:g} N m/rad, the stiffness_range of the "
+                "patient's orthosis",
+                mend="correct one of the two",
+            )
+            return
+
+
+def _spring_key(solver: GaitSolver, name: str) -> str:
+    given = solver.config.bounds.stiffness
+    return f"bounds.stiffness.{name}" if name in given else f"bounds.{name.rpartition('_')[0]}"
+
+
+def _partly_real_springs(solver: GaitSolver) -> Iterator[str]:
+    if solver.walker.orthosis is None:
+        return
+    for name in STIFFNESSES:
+        low, high = solver.bounds.table.entries[(name,)]
+        least, most = _real_range(solver, name)
+        if low < least or high > most:
+            yield (
+                f"{_spring_key(solver, name)} lets {name} reach [{low:g}, {high:g}] N m/rad; real "
+                f"springs end at [{least:g}, {most:g}]"
+            )
+
+
+def _start_springs(solver: GaitSolver) -> Iterator[str]:
+    for name, value in solver.config.start.stiffness.items():
+        if solver.walker.orthosis is None:
+            yield f"start.stiffness.{name} has no effect barefoot"
+            continue
+        low, high = solver.bounds.table.entries[(name,)]
+        if not low <= value <= high:
+            yield (
+                f"start.stiffness.{name} {value:g} N m/rad lies outside its bounds "
+                f"[{low:g}, {high:g}]: the search begins at the nearer end"
+            )
+
+
+def _start_angles(solver: GaitSolver) -> Iterator[str]:
+    """Yield a sentence per joint that the start keeps wholly outside its range."""
+    stride = solver.stride.trajectory
+    for name in _ANGLES:
+        low, high = solver.bounds.table.entries[(name,)]
+        angles = stride[name]
+        if angles.max() < low or angles.min() > high:
+            yield (
+                f"the {solver.stride.name} start moves {name} between {angles.min():.2f} and "
+                f"{angles.max():.2f} rad, all outside its range [{low:.2f}, {high:.2f}]: the solve "
+                "may not converge from there; another start.knee_flexion or a recorded start may help"
+            )
+
+
+def _comfort(solver: GaitSolver) -> Iterator[str]:
+    for name, (low, high) in solver.config.cost.comfort_ranges.items():
+        least, most = solver.bounds.table.entries.get((name,), (low, high))
+        if low > most or high < least:
+            yield (
+                f"cost.comfort_ranges.{name} [{low:g}, {high:g}] rad lies outside the range that "
+                f"the bounds allow, [{least:.3g}, {most:.3g}]"
+            )
