@@ -80,7 +80,9 @@ def check_landscape(path: str) -> Checked:
     ranges = _ranges(solver)
     with placed(path):
         sizes = [
-            axis_values(getattr(study, kind), ranges[f"{kind}_stiffness_{study.sides[0]}"], kind).size
+            axis_values(
+                getattr(study, kind), ranges[f"{kind}_stiffness_{study.sides[0]}"], kind
+            ).size
             for kind in ("dorsiflexion", "plantarflexion")
         ]
     solves = sizes[0] * sizes[1] + 4 * study.leaps
@@ -158,7 +160,10 @@ def _study(
 ) -> Checked:
     base = described(solver, path)
     rows: list[Row] = [
-        ("base", f"{solver.config.problem}, {solver.walker.condition}, solved unless --run is given"),
+        (
+            "base",
+            f"{solver.config.problem}, {solver.walker.condition}, solved unless --run is given",
+        ),
         *patient_rows(solver.walker.patient),
         ("does", what),
         ("solves", f"{about}{solves} neighbours of the base, each from its solution"),
@@ -176,5 +181,3 @@ def _study(
 def _seconds(base: Checked) -> str:
     row = dict(base.rows)
     return row["expected time"]
-
-

@@ -175,9 +175,7 @@ def _recording(
     )
 
 
-def _plate(
-    number: int, stance: Stance, played: _Played, child: _Body, other: _Body
-) -> ForcePlate:
+def _plate(number: int, stance: Stance, played: _Played, child: _Body, other: _Body) -> ForcePlate:
     """Return a plate below a stance, with the load of that stance alone."""
     force, point = _load(stance, played, child, other)
     middle = float(np.median(point[force[:, 2] > 0.0]))
