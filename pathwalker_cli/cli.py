@@ -8,9 +8,11 @@ from typing import Any, Final, NoReturn
 import click
 
 from pathwalker_cli import __version__
+from pathwalker_cli.commands.examples import examples_epilog
+from pathwalker_cli.commands.json_output import print_failure
 from pathwalker_cli.errors import NotConvergedError, PathwalkerError
 
-__all__ = ["COMMANDS", "NOT_CONVERGED", "REFUSED", "STOPPED", "cli", "main"]
+__all__ = ["COMMANDS", "GROUPS", "NOT_CONVERGED", "REFUSED", "STOPPED", "cli", "main"]
 
 NOT_CONVERGED: Final = 1
 """Exit code of a solve that did not converge."""
@@ -120,6 +122,16 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
         "init_command",
         "Write a folder for a new child: patient, orthosis and configs that explain themselves.",
     ),
+    "check": (
+        "pathwalker_cli.commands.check",
+        "check_command",
+        "Check configs, patients and marker sets, and say what would be solved; nothing is solved.",
+    ),
+    "completion": (
+        "pathwalker_cli.commands.completion",
+        "completion_command",
+        "Print the script that completes commands, options, configs, problems and runs in SHELL.",
+    ),
     "doctor": (
         "pathwalker_cli.commands.doctor",
         "doctor_command",
@@ -127,6 +139,17 @@ COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
     ),
 }
 """Module, attribute and first line of help of every command: listing them imports none."""
+
+
+GROUPS: Final[dict[str, tuple[str, ...]]] = {
+    "Predict": ("solve", "batch", "reproduce"),
+    "Springs and certainty": ("perturb", "sensitivity", "uncertainty", "landscape", "tradeoff"),
+    "Recorded gait": ("import", "ik", "id"),
+    "Look and compare": ("report", "animate", "view", "compare", "evaluate", "model"),
+    "Prove": ("verify", "rerun"),
+    "Set up": ("init", "check", "doctor", "completion"),
+}
+"""Commands by what they are for, in the order of the help."""
 
 
 class _LazyGroup(click.Group):
@@ -140,6 +163,7 @@ class _LazyGroup(click.Group):
             return None
         module, attribute, _ = COMMANDS[cmd_name]
         command: click.Command = getattr(import_module(module), attribute)
+        command.epilog = examples_epilog(cmd_name)
         return command
 
     def resolve_command(
@@ -150,14 +174,22 @@ class _LazyGroup(click.Group):
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, _, text) in COMMANDS.items()])
+        grouped = {name for names in GROUPS.values() for name in names}
+        others = tuple(name for name in COMMANDS if name not in grouped)
+        width = max(map(len, COMMANDS))
+        for heading, names in {**GROUPS, "Others": others}.items():
+            if names:
+                with formatter.section(heading):
+                    rows = [(f"{name:<{width}}", COMMANDS[name][2]) for name in names]
+                    formatter.write_dl(rows)
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
         except PathwalkerError as error:
             code = NOT_CONVERGED if isinstance(error, NotConvergedError) else REFUSED
+            if code == NOT_CONVERGED:
+                print_failure(ctx, str(error))
             _fail(ctx, str(error), code)
         except KeyboardInterrupt:
             _fail(ctx, "stopped by the user before there was anything to keep", STOPPED)
@@ -171,6 +203,7 @@ def _fail(ctx: click.Context, sentence: str, code: int) -> NoReturn:
 
 @click.group(
     cls=_LazyGroup,
+    epilog="Start with: pathwalker init my-child",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(__version__, prog_name="pathwalker")

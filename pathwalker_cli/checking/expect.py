@@ -1,6 +1,6 @@
-"""How long a solve may take: measured seconds of the shipped patient, by unknowns.
+"""How long a solve may take: measured seconds of the shipped patient, by size.
 
-Iterations and CPU seconds are those of docs/performance.md, "Whole solves", with derivatives cached.
+Iterations and CPU seconds are those of docs/performance.md, "Whole solves", derivatives cached.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ FIXED: Final = 4.0
 """CPU seconds of imports, figures and tables, whatever is solved."""
 
 _INTERVALS: Final = (64, 48)
-"""Intervals that the two measured solves began with."""
+_DEGREE: Final = 3
+"""Intervals that the two measured solves began with, and their collocation points."""
 
 _SPREAD: Final = (0.7, 2.0)
 """Shares of the measured iterations between which other children and starts end: those of the
@@ -69,24 +70,21 @@ class Seconds:
         """Say it for people."""
         return (
             f"about {self.likely:.0f} s ({self.least:.0f} to {self.most:.0f}) of one core on the "
-            "machine of docs/performance.md"
+            f"machine of docs/performance.md, {self.iterations} iterations"
         )
 
 
-def expected(config: StudyConfig, intervals: int, unknowns: int) -> Seconds:
+def expected(config: StudyConfig, intervals: int) -> Seconds:
     """Return how long a solve may take.
 
     Args:
         config: The study.
-        intervals: Intervals of its first mesh.
-        unknowns: Unknowns on that mesh.
+        intervals: Intervals of its first mesh; unknowns, and seconds per iteration, are in
+            proportion to their collocation points.
     """
     refined = config.mesh.refinements > 0
     measured = MEASURED[config.problem][refined]
-    # unknowns per interval are those of the problem; more of them on a finer mesh, or of a
-    # higher degree, make an iteration longer in proportion
-    degrees = config.mesh.degree / 3.0
-    size = degrees * intervals / _INTERVALS[refined]
+    size = intervals * config.mesh.degree / (_INTERVALS[refined] * _DEGREE)
     verdict = _VERDICT if config.verdict and config.condition == "orthosis" else 1.0
     solve = (measured.seconds - FIXED) * size * config.starts * verdict
     return Seconds(

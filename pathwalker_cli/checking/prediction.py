@@ -22,7 +22,14 @@ from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient_blocks import Strengths
 from pathwalker_cli.studies.batch.checks import check_patient
 
-__all__ = ["check_prediction", "patient_rows", "ready_solver"]
+__all__ = [
+    "check_prediction",
+    "described",
+    "patient_content",
+    "patient_notes",
+    "patient_rows",
+    "ready_solver",
+]
 
 
 def check_prediction(path: str, problem: str = "") -> Checked:
@@ -69,10 +76,10 @@ def described(solver: GaitSolver, path: str) -> Checked:
     )
     intervals = sum(len(mesh) - 1 for mesh in program.meshes)
     unknowns, rows = program.program.size, program.program.rows
-    seconds = expected(config, intervals, unknowns)
+    seconds = expected(config, intervals)
     weights = _weights(solver)
     names = [phase.name for phase in solver.gait.phases]
-    springs = _free_springs(solver)
+    springs, mirrored = _free_springs(solver), config.half_cycle
     shooting = config.transcription == "multiple-shooting"
     folder = Path("runs") / f"{config.problem}-{patient.id}"
     recordings = {c: recording_names(patient, c) for c in CONDITIONS}
@@ -81,12 +88,12 @@ def described(solver: GaitSolver, path: str) -> Checked:
     table: list[Row] = [
         ("problem", f"{config.problem}, {walker.condition}"),
         *patient_rows(patient),
-        ("phases", f"{len(names)}: {', '.join(names)}"),
+        ("phases", f"{len(names)}: {', '.join(names)}" + "; then their mirror image" * mirrored),
         ("start", solver.stride.name + (f", {config.starts} starts" * (config.starts > 1))),
         (
             "size",
             f"{intervals} intervals of degree {config.mesh.degree} to begin with, {unknowns:,} "
-            f"unknowns, {rows:,} rows, {_count(len(springs), 'free stiffness', 'es')}",
+            f"unknowns, {rows:,} rows; free parameters: {len(springs)}",
         ),
         *(("bounds", f"{name}: {text}") for name, text in bounds.items()),
         *(("cost, weights", f"{name.replace('_', ' ')}: {value:g}") for name, value in weights),
@@ -118,7 +125,7 @@ def described(solver: GaitSolver, path: str) -> Checked:
             "most": round(seconds.most, 1),
         },
     }
-    notes = (*oddities(solver), *patient.notes)
+    notes = (*oddities(solver), *patient_notes(patient))
     return Checked(path, "prediction", tuple(table), content, notes)
 
 
@@ -229,7 +236,7 @@ def _changed(config: StudyConfig) -> dict[str, str]:
 
 def _flat(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of all blocks by dotted key."""
-    found = {}
+    found: dict[str, Any] = {}
     for block, value in content.items():
         if isinstance(value, Mapping) and block in StudyConfig.model_fields:
             found |= {f"{block}.{key}": entry for key, entry in value.items()}
@@ -245,7 +252,7 @@ def _short(value: Any) -> str:
         return "[" + ", ".join(map(_short, value)) + "]"
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
-    return str(value)
+    return str(value) or '""'
 
 
 def _recordings(found: Mapping[str, tuple[str, ...]]) -> str:
@@ -263,5 +270,11 @@ def _output(folder: Path) -> str:
     return f"{folder}, {'replaces the run that is there' if holds else 'a new folder'}"
 
 
-def _count(number: int, name: str, ending: str) -> str:
-    return f"{number} {name}{ending if number != 1 else ''}"
+def patient_notes(patient: Patient) -> tuple[str, ...]:
+    """Return what was filled in for a patient, lengths from body proportions in one sentence."""
+    begin = "segment length "
+    lengths = [note for note in patient.notes if note.startswith(begin)]
+    names = ", ".join(note.removeprefix(begin).partition(":")[0] for note in lengths)
+    reason = lengths[0].partition(", ")[2] if lengths else ""
+    together = (f"segment lengths {names}: {reason}",) if lengths else ()
+    return (*together, *(note for note in patient.notes if note not in lengths))

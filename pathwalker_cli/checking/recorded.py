@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pathwalker_cli.checking.prediction import patient_content, patient_rows
+from pathwalker_cli.checking.prediction import patient_content, patient_notes, patient_rows
 from pathwalker_cli.checking.report import Checked, Row
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import ConfigError, placed
@@ -74,11 +74,11 @@ def check_markers(path: str) -> Checked:
 def check_patient_file(path: str) -> Checked:
     """Return who a patient is; the models of both conditions are built."""
     patient = load_patient(path)
-    conditions = CONDITIONS if patient.orthosis else CONDITIONS[:1]
     with placed(path):
         if patient.strengths is not None:
-            for condition in conditions:
-                build_walker(patient, condition)
+            build_walker(patient, "barefoot")
+            if patient.orthosis is not None:
+                build_walker(patient, "orthosis")
     recordings = {c: recording_names(patient, c) for c in CONDITIONS}
     rows = [
         *patient_rows(patient),
@@ -90,7 +90,7 @@ def check_patient_file(path: str) -> Checked:
     missing = ["strengths are not given: nothing can be predicted yet"] * (
         patient.strengths is None
     )
-    return Checked(path, "patient", tuple(rows), content, (*missing, *patient.notes))
+    return Checked(path, "patient", tuple(rows), content, (*missing, *patient_notes(patient)))
 
 
 def check_orthosis(path: str) -> Checked:
@@ -127,4 +127,4 @@ def _recorded(
     rows = [*patient_rows(patient)]
     rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in found.items() if n]
     content: dict[str, Any] = {"patient": patient_content(patient), "trials": found}
-    return Checked(path, kind, tuple(rows), content, patient.notes)
+    return Checked(path, kind, tuple(rows), content, patient_notes(patient))

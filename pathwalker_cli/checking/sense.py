@@ -172,8 +172,8 @@ def _start_angles(solver: GaitSolver) -> Iterator[str]:
         if angles.max() < low or angles.min() > high:
             yield (
                 f"the {solver.stride.name} start moves {name} between {angles.min():.2f} and "
-                f"{angles.max():.2f} rad, all outside its range [{low:.2f}, {high:.2f}]: the solve "
-                "may not converge from there; another start.knee_flexion or a recorded start may help"
+                f"{angles.max():.2f} rad, all outside its range [{low:.2f}, {high:.2f}]: it "
+                "may not converge from there; try another start.knee_flexion or a recorded start"
             )
 
 

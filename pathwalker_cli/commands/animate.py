@@ -7,6 +7,8 @@ from pathlib import Path
 
 import click
 
+from pathwalker_cli.commands.complete import complete_runs
+
 __all__ = ["animate_command"]
 
 _PAGE, _FILMS = ".html", (".gif", ".mp4")
@@ -14,7 +16,12 @@ _PAGE, _FILMS = ".html", (".gif", ".mp4")
 
 @click.command("animate")
 @click.argument(
-    "runs", nargs=-1, required=True, metavar="RUN [RUN]", type=click.Path(path_type=Path)
+    "runs",
+    nargs=-1,
+    required=True,
+    metavar="RUN [RUN]",
+    type=click.Path(path_type=Path),
+    shell_complete=complete_runs,
 )
 @click.option(
     "-o",

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathwalker_cli.commands.complete import complete_configs
+from pathwalker_cli.commands.json_output import json_option, print_json
+
 if TYPE_CHECKING:
     from pathwalker_cli.studies.batch.worker import Pool
 
@@ -15,7 +18,7 @@ __all__ = ["batch_command"]
 
 
 @click.command("batch")
-@click.argument("study", metavar="STUDY")
+@click.argument("study", metavar="STUDY", shell_complete=complete_configs)
 @click.option(
     "-o",
     "--out",
@@ -45,6 +48,7 @@ __all__ = ["batch_command"]
     "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Override a key of STUDY."
 )
 @click.option("--quiet", is_flag=True, help="Print errors only.")
+@json_option
 def batch_command(
     study: str,
     out: Path | None,
@@ -53,6 +57,7 @@ def batch_command(
     time_limit: float | None,
     changes: tuple[str, ...],
     quiet: bool,
+    as_json: bool,
 ) -> None:
     """Solve every case of STUDY: patients, problems and overrides in any number.
 
@@ -65,13 +70,15 @@ def batch_command(
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.studies.batch.cases import load_cases
     from pathwalker_cli.studies.batch.study import run_batch
-    from pathwalker_cli.studies.batch.text import failure_sentence, report_text
+    from pathwalker_cli.studies.batch.text import failure_sentence, report_content, report_text
 
     batch = load_cases(study, changes)
     folder = out or Path("runs") / batch.name
     with _pool(workers, scheduler, time_limit) as pool, BatchProgress(quiet) as progress:
         report = run_batch(batch.cases, folder, pool, progress)
-    if not quiet:
+    if as_json:
+        print_json(report_content(report))
+    elif not quiet:
         click.echo(report_text(report))
     if report.failed:
         raise NotConvergedError(failure_sentence(report))

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.json_output import json_option, print_json
+
 if TYPE_CHECKING:
     from pathwalker_cli.report.compare import Comparison
 
@@ -14,7 +17,14 @@ __all__ = ["compare_command"]
 
 
 @click.command("compare")
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=click.Path(path_type=Path))
+@click.argument(
+    "runs",
+    nargs=-1,
+    required=True,
+    metavar="RUN...",
+    type=click.Path(path_type=Path),
+    shell_complete=complete_runs,
+)
 @click.option(
     "-o",
     "--out",
@@ -22,7 +32,7 @@ __all__ = ["compare_command"]
     metavar="DIR",
     help="Folder for compare.csv, compare.json and figures; nothing is written if left out.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print compare.json, not the tables.")
+@json_option
 def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
     """Compare the metrics of two or more run folders; the first RUN is the base.
 
@@ -32,7 +42,6 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
     from textwrap import fill
 
     from pathwalker_cli.errors import DataError
-    from pathwalker_cli.io.json_file import json_text
     from pathwalker_cli.report.compare import compare_runs
     from pathwalker_cli.report.compare_text import comparison_content, comparison_lines
 
@@ -42,7 +51,7 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
     if out is not None:
         _write(out, found)
     if as_json:
-        click.echo(json_text(comparison_content(found)), nl=False)
+        print_json(comparison_content(found))
         return
     click.echo("\n".join(comparison_lines(found)))
     for note in found.notes:

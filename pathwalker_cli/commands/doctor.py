@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import click
+
+from pathwalker_cli.commands.json_output import json_option, print_json
 
 __all__ = ["Finding", "doctor_command", "findings"]
 
@@ -30,7 +31,7 @@ class Finding:
 
 
 @click.command("doctor")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON for scripts.")
+@json_option
 @click.pass_context
 def doctor_command(context: click.Context, as_json: bool) -> None:
     """Check versions, dynamics back ends, solver and shipped data; exit code 0 if all is usable."""
@@ -38,7 +39,7 @@ def doctor_command(context: click.Context, as_json: bool) -> None:
     usable = all(finding.ok for finding in found if finding.needed)
     if as_json:
         content = {"usable": usable, "findings": [asdict(finding) for finding in found]}
-        click.echo(json.dumps(content, indent=2))
+        print_json(content)
     else:
         for finding in found:
             mark = "ok" if finding.ok else ("MISSING" if finding.needed else "-")

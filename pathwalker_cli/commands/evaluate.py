@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.json_output import json_option, print_json
+
 if TYPE_CHECKING:
     from pathwalker_cli.evaluation.evaluate import Change, Evaluation
     from pathwalker_cli.evaluation.gait import Gait
@@ -16,7 +19,14 @@ __all__ = ["evaluate_command"]
 
 
 @click.command("evaluate")
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=click.Path(path_type=Path))
+@click.argument(
+    "runs",
+    nargs=-1,
+    required=True,
+    metavar="RUN...",
+    type=click.Path(path_type=Path),
+    shell_complete=complete_runs,
+)
 @click.option("--trial", metavar="NAME", help="Trial to compare joint angles with at equal time.")
 @click.option(
     "-o",
@@ -25,7 +35,7 @@ __all__ = ["evaluate_command"]
     metavar="DIR",
     help="Output folder; runs/evaluation-RUN if left out.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print evaluation.json, not the tables.")
+@json_option
 def evaluate_command(
     runs: tuple[Path, ...], trial: str | None, out: Path | None, as_json: bool
 ) -> None:
@@ -37,7 +47,6 @@ def evaluate_command(
     from pathwalker_cli.evaluation.evaluate import evaluate_gait
     from pathwalker_cli.evaluation.files import evaluation_content
     from pathwalker_cli.evaluation.run import gaits_of_runs
-    from pathwalker_cli.io.json_file import json_text
 
     gaits = gaits_of_runs(runs)
     trials = _trials(gaits, trial)
@@ -47,7 +56,7 @@ def evaluate_command(
     out = out or Path("runs") / "-".join(["evaluation", *(gait.name for gait in gaits)])
     _write(out, evaluations, content)
     if as_json:
-        click.echo(json_text(content), nl=False)
+        print_json(content)
     else:
         _report(evaluations, changes, out)
 

@@ -36,7 +36,7 @@ def init_command(
     from pathwalker_cli.starter.files import command_lines, next_steps
     from pathwalker_cli.starter.folder import write_folder
 
-    child = made_child(name or folder.resolve().name, age, mass, height)
+    child = made_child(name or _safe(folder.resolve().name), age, mass, height)
     worn = not without_orthosis
     write_folder(folder, child, worn, example)
     click.echo(
@@ -48,6 +48,13 @@ def init_command(
         click.echo(f"\n{click.wrap_text(step.why, 80, '# ', '# ')}")
         for command in step.commands:
             click.echo(command_lines(command, 2))
+
+
+def _safe(name: str) -> str:
+    """Return the name of a folder as an id."""
+    import re
+
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-_")[:64] or "child"
 
 
 def _quoted(folder: Path) -> str:

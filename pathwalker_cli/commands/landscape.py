@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from pathwalker_cli.commands.json_output import print_json
 from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
 
 __all__ = ["landscape_command"]
@@ -14,7 +15,12 @@ __all__ = ["landscape_command"]
 @click.command("landscape")
 @study_options("runs/landscape")
 def landscape_command(
-    config: str, out: Path, run: Path | None, changes: tuple[str, ...], quiet: bool
+    config: str,
+    out: Path,
+    run: Path | None,
+    changes: tuple[str, ...],
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Map the cost over K_D and K_P of a side, as CONFIG says, and the region of nearly best ones.
 
@@ -24,7 +30,7 @@ def landscape_command(
     base did not converge or Ctrl-C, 2 bad input.
     """
     from pathwalker_cli.studies.base import check_folder, load_study
-    from pathwalker_cli.studies.landscape.files import ENTRIES, write_landscape
+    from pathwalker_cli.studies.landscape.files import ENTRIES, landscape_content, write_landscape
     from pathwalker_cli.studies.landscape.solve import landscape_of
     from pathwalker_cli.studies.landscape.study import LandscapeStudy
     from pathwalker_cli.studies.landscape.text import landscape_lines
@@ -33,5 +39,7 @@ def landscape_command(
     check_folder(out, ENTRIES, "landscape")
     landscape = landscape_of(study, base_of(study, run, out, quiet), out / "points", teller(quiet))
     write_landscape(out, landscape)
-    if not quiet:
+    if as_json:
+        print_json({"folder": str(out), **landscape_content(landscape)})
+    elif not quiet:
         click.echo("\n".join([*landscape_lines(landscape), f"\nWritten to {out}"]))

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
+from pathwalker_cli.commands.complete import complete_patients
+
 if TYPE_CHECKING:
     from pathwalker_cli.conventions import Condition
     from pathwalker_cli.model.anthropometry import Segment
@@ -16,7 +18,7 @@ __all__ = ["model_command"]
 
 
 @click.command("model")
-@click.argument("patient", metavar="PATIENT")
+@click.argument("patient", metavar="PATIENT", shell_complete=complete_patients)
 @click.option(
     "--condition",
     required=True,

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from pathwalker_cli.commands.complete import complete_configs, complete_runs
+from pathwalker_cli.commands.json_output import json_option
+
 if TYPE_CHECKING:
     from pathwalker_cli.output.run_folder import Run
     from pathwalker_cli.studies.base import NeighbourStudy
@@ -17,13 +20,14 @@ __all__ = ["base_of", "study_options", "teller"]
 Command = Callable[..., Any]
 
 
-_CONFIG = click.argument("config", metavar="CONFIG")
+_CONFIG = click.argument("config", metavar="CONFIG", shell_complete=complete_configs)
 
 _OPTIONS = (
     click.option(
         "--run",
         type=click.Path(path_type=Path),
         metavar="RUN",
+        shell_complete=complete_runs,
         help="Folder of a converged run to stand on, instead of solving the base.",
     ),
     click.option(
@@ -34,6 +38,7 @@ _OPTIONS = (
         help="Override a value of CONFIG; 'set={KEY: VALUE}' overrides one of the base.",
     ),
     click.option("--quiet", is_flag=True, help="Print errors only."),
+    json_option,
 )
 
 

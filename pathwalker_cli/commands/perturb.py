@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathwalker_cli.commands.json_output import print_json
 from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
 
 if TYPE_CHECKING:
@@ -22,7 +23,12 @@ ENTRIES = frozenset({"base", "points", "figures", "perturbation.csv", "perturbat
 @click.command("perturb")
 @study_options("runs/perturbation")
 def perturb_command(
-    config: str, out: Path, run: Path | None, changes: tuple[str, ...], quiet: bool
+    config: str,
+    out: Path,
+    run: Path | None,
+    changes: tuple[str, ...],
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Move every orthosis spring a little from its optimum and solve all the rest again.
 
@@ -35,7 +41,11 @@ def perturb_command(
     from pathwalker_cli.studies.base import check_folder, load_study
     from pathwalker_cli.studies.perturbation.figures import save_perturbation_figure
     from pathwalker_cli.studies.perturbation.study import PerturbationStudy, perturb
-    from pathwalker_cli.studies.perturbation.text import perturbation_lines, write_perturbation
+    from pathwalker_cli.studies.perturbation.text import (
+        perturbation_content,
+        perturbation_lines,
+        write_perturbation,
+    )
 
     study = load_study(config, PerturbationStudy, changes)
     check_folder(out, ENTRIES, "perturb")
@@ -51,7 +61,9 @@ def perturb_command(
     )
     write_perturbation(result, out)
     save_perturbation_figure(result, out / "figures")
-    if not quiet:
+    if as_json:
+        print_json({"folder": str(out), **perturbation_content(result)})
+    elif not quiet:
         click.echo("\n".join(perturbation_lines(result)))
         click.echo(f"\nWritten to {out}")
     if result.failed:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from pathwalker_cli.commands.complete import complete_configs, complete_patients
+from pathwalker_cli.commands.json_output import json_option, print_json
 from pathwalker_cli.conventions import CONDITIONS, Condition
 
 if TYPE_CHECKING:
@@ -32,7 +34,12 @@ _SET = click.option(
 
 @click.command("import")
 @click.argument("c3d", nargs=-1, required=True, metavar="C3D...")
-@click.option("--patient", required=True, help="Shipped id, folder with patient.yaml, or a file.")
+@click.option(
+    "--patient",
+    required=True,
+    help="Shipped id, folder with patient.yaml, or a file.",
+    shell_complete=complete_patients,
+)
 @click.option("--condition", required=True, type=click.Choice(CONDITIONS), help="What was worn.")
 @click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Output folder.")
 @click.option("--markers", help="Marker set; the shipped markers.yaml if left out.")
@@ -65,7 +72,7 @@ def import_command(
 
 
 @click.command("ik")
-@click.argument("config", metavar="CONFIG")
+@click.argument("config", metavar="CONFIG", shell_complete=complete_configs)
 @_OUT
 @_SET
 @_QUIET
@@ -84,7 +91,7 @@ def ik_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: b
 
 
 @click.command("id")
-@click.argument("config", metavar="CONFIG")
+@click.argument("config", metavar="CONFIG", shell_complete=complete_configs)
 @_OUT
 @_SET
 @click.option(
@@ -93,8 +100,14 @@ def ik_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: b
     help="Put strengths, speed, steps and joint ranges into the patient's file.",
 )
 @_QUIET
+@json_option
 def id_command(
-    config: str, out: Path | None, changes: tuple[str, ...], update_patient: bool, quiet: bool
+    config: str,
+    out: Path | None,
+    changes: tuple[str, ...],
+    update_patient: bool,
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Compute joint torques, pelvis residuals and muscle strengths from recorded gait.
 
@@ -110,7 +123,11 @@ def id_command(
     )
     from pathwalker_cli.output.patient_update import require_own_patient
     from pathwalker_cli.output.recorded_study import write_dynamics, write_origin
-    from pathwalker_cli.output.recorded_text import residuals_renderable, strengths_renderable
+    from pathwalker_cli.output.recorded_text import (
+        dynamics_content,
+        residuals_renderable,
+        strengths_renderable,
+    )
     from pathwalker_cli.patient import load_patient
 
     def write(folder: Path, trials: Sequence[StudyTrial], patient: Patient) -> _Findings:
@@ -121,7 +138,8 @@ def id_command(
         warnings = study_warnings(trials, tables, patient, study.largest_residual)
         shown = (residuals_renderable(tables), strengths_renderable(strengths))
         changed = _updated(patient, trials, strengths, study.method) if update_patient else ""
-        return _Findings(warnings, shown, changed)
+        content = dynamics_content(trials, tables, strengths) if as_json else None
+        return _Findings(warnings, shown, changed, content)
 
     study = load_inverse_dynamics(config, changes)
     if update_patient:
@@ -154,6 +172,7 @@ class _Findings:
     warnings: Sequence[str] = ()
     tables: Sequence[RenderableType] = ()
     changed: str = ""
+    content: dict[str, Any] | None = None
 
 
 def _study(
@@ -183,7 +202,11 @@ def _study(
         with Console(stderr=True, quiet=quiet).status("") as status:
             trials = evaluate(config, patient, status.update)
         findings = write(folder, trials, patient)
+    if findings.content is not None:
+        content = {"folder": str(out), **findings.content, "updated": findings.changed or None}
+        print_json({**content, "warnings": list(findings.warnings)})
     # As wide as the terminal, or wide enough without one.
+    quiet = quiet or findings.content is not None
     console = Console(quiet=quiet, width=None if Console().is_terminal else 120)
     console.print(trials_renderable(trials))
     for note in stance_notes(trials):

@@ -6,11 +6,20 @@ from pathlib import Path
 
 import click
 
+from pathwalker_cli.commands.complete import complete_runs
+
 __all__ = ["report_command"]
 
 
 @click.command("report")
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=click.Path(path_type=Path))
+@click.argument(
+    "runs",
+    nargs=-1,
+    required=True,
+    metavar="RUN...",
+    type=click.Path(path_type=Path),
+    shell_complete=complete_runs,
+)
 @click.option(
     "-o",
     "--out",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from pathwalker_cli.commands.json_output import print_json
 from pathwalker_cli.commands.neighbour_study import base_of, study_options
 
 __all__ = ["sensitivity_command"]
@@ -14,7 +15,12 @@ __all__ = ["sensitivity_command"]
 @click.command("sensitivity")
 @study_options("runs/sensitivity")
 def sensitivity_command(
-    config: str, out: Path, run: Path | None, changes: tuple[str, ...], quiet: bool
+    config: str,
+    out: Path,
+    run: Path | None,
+    changes: tuple[str, ...],
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Tell what one percent of every number would change, without solving again.
 
@@ -28,6 +34,7 @@ def sensitivity_command(
     from pathwalker_cli.studies.sensitivity.study import SensitivityStudy, sensitivities
     from pathwalker_cli.studies.sensitivity.text import (
         FILES,
+        sensitivity_content,
         sensitivity_lines,
         write_sensitivities,
     )
@@ -37,6 +44,8 @@ def sensitivity_command(
     result = sensitivities(study, base_of(study, run, out, quiet), out)
     write_sensitivities(result, out)
     save_sensitivity_figure(result, out / "figures")
-    if not quiet:
+    if as_json:
+        print_json({"folder": str(out), **sensitivity_content(result)})
+    elif not quiet:
         click.echo("\n".join(sensitivity_lines(result)))
         click.echo(f"\nWritten to {out}")

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from pathwalker_cli.commands.complete import complete_configs, complete_problems, complete_runs
+from pathwalker_cli.commands.json_output import json_option, print_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -20,8 +23,8 @@ __all__ = ["solve_command"]
 
 
 @click.command("solve")
-@click.argument("problem", metavar="PROBLEM")
-@click.argument("config", metavar="CONFIG")
+@click.argument("problem", metavar="PROBLEM", shell_complete=complete_problems)
+@click.argument("config", metavar="CONFIG", shell_complete=complete_configs)
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -32,6 +35,7 @@ __all__ = ["solve_command"]
     "--warm-start",
     type=click.Path(path_type=Path),
     metavar="RUN",
+    shell_complete=complete_runs,
     help="Folder of a converged run of the same condition to begin with.",
 )
 @click.option("--smoke", is_flag=True, help="Coarse mesh without refinement, for a quick check.")
@@ -39,6 +43,7 @@ __all__ = ["solve_command"]
     "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Override a config value."
 )
 @click.option("--quiet", is_flag=True, help="Print errors only.")
+@json_option
 def solve_command(
     problem: str,
     config: str,
@@ -47,6 +52,7 @@ def solve_command(
     smoke: bool,
     changes: tuple[str, ...],
     quiet: bool,
+    as_json: bool,
 ) -> None:
     """Solve PROBLEM, e.g. mapd-orthosis, as CONFIG says and write a run folder.
 
@@ -63,7 +69,9 @@ def solve_command(
     with Progress(quiet) as progress:
         outcome = run_study(study, folder, warm_start, progress)
     solution = outcome.solution
-    if not quiet:
+    if as_json:
+        print_json(_content(outcome, folder))
+    elif not quiet:
         _report(outcome, folder)
     if not solution.converged:
         raise NotConvergedError(failure_text(solution, str(folder)))
@@ -89,6 +97,17 @@ def _study(
             error.what, where=where, allowed=error.allowed, mend=error.mend
         ) from None
     return smoke_version(study) if smoke else study, patient
+
+
+def _content(outcome: Outcome, folder: Path) -> dict[str, Any]:
+    """Return how a run ended as plain values: where it is, its status, and metrics.json."""
+    status, converged = outcome.solution.status, outcome.solution.converged
+    return {
+        "folder": str(folder),
+        "status": status,
+        "converged": converged,
+        "metrics": outcome.metrics,
+    }
 
 
 def _report(outcome: Outcome, folder: Path) -> None:

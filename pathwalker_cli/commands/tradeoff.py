@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from pathwalker_cli.commands.json_output import print_json
 from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
 
 __all__ = ["tradeoff_command"]
@@ -14,7 +15,12 @@ __all__ = ["tradeoff_command"]
 @click.command("tradeoff")
 @study_options("runs/tradeoff")
 def tradeoff_command(
-    config: str, out: Path, run: Path | None, changes: tuple[str, ...], quiet: bool
+    config: str,
+    out: Path,
+    run: Path | None,
+    changes: tuple[str, ...],
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Find the front of effort per distance and walking speed, as CONFIG says.
 
@@ -26,7 +32,7 @@ def tradeoff_command(
     """
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.studies.base import check_folder, load_study
-    from pathwalker_cli.studies.tradeoff.files import ENTRIES, write_tradeoff
+    from pathwalker_cli.studies.tradeoff.files import ENTRIES, tradeoff_content, write_tradeoff
     from pathwalker_cli.studies.tradeoff.study import TradeoffStudy, tradeoff_of
     from pathwalker_cli.studies.tradeoff.text import tradeoff_lines
 
@@ -35,5 +41,7 @@ def tradeoff_command(
     base = base_of(study, run, out, quiet)
     tradeoff = tradeoff_of(study, base, out, teller(quiet), Progress(quiet=True))
     write_tradeoff(out, tradeoff)
-    if not quiet:
+    if as_json:
+        print_json({"folder": str(out), **tradeoff_content(tradeoff)})
+    elif not quiet:
         click.echo("\n".join([*tradeoff_lines(tradeoff), f"\nWritten to {out}"]))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathwalker_cli.commands.json_output import print_json
 from pathwalker_cli.commands.neighbour_study import study_options, teller
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ def uncertainty_command(
     run: Path | None,
     changes: tuple[str, ...],
     quiet: bool,
+    as_json: bool,
     workers: int | None,
 ) -> None:
     """Draw the uncertain numbers of a patient and identify the springs anew for every draw.
@@ -54,7 +56,11 @@ def uncertainty_command(
     from pathwalker_cli.studies.base import check_folder, load_study
     from pathwalker_cli.studies.uncertainty.figures import save_uncertainty_figures
     from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, uncertainty
-    from pathwalker_cli.studies.uncertainty.text import uncertainty_lines, write_uncertainty
+    from pathwalker_cli.studies.uncertainty.text import (
+        uncertainty_content,
+        uncertainty_lines,
+        write_uncertainty,
+    )
 
     study = load_study(config, UncertaintyStudy, changes)
     check_folder(out, ENTRIES, "uncertainty")
@@ -63,7 +69,9 @@ def uncertainty_command(
     result = uncertainty(study, base, out, count, _counted(study.draws, teller(quiet)))
     write_uncertainty(result, out)
     save_uncertainty_figures(result, out / "figures")
-    if not quiet:
+    if as_json:
+        print_json({"folder": str(out), **uncertainty_content(result)})
+    elif not quiet:
         click.echo("\n".join(uncertainty_lines(result)))
         click.echo(f"\nWritten to {out}")
     if result.failed:

@@ -6,12 +6,22 @@ from pathlib import Path
 
 import click
 
+from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.json_output import json_option, print_json
+
 __all__ = ["rerun_command", "verify_command"]
 
 
 @click.command("verify")
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Print the checks as JSON.")
+@click.argument(
+    "runs",
+    nargs=-1,
+    required=True,
+    metavar="RUN...",
+    type=click.Path(path_type=Path),
+    shell_complete=complete_runs,
+)
+@json_option
 def verify_command(runs: tuple[Path, ...], as_json: bool) -> None:
     """Check run folders from their files alone, without solving again.
 
@@ -21,7 +31,6 @@ def verify_command(runs: tuple[Path, ...], as_json: bool) -> None:
     a check failed or a run did not converge, 2 a folder cannot be read.
     """
     from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.io.json_file import json_text
     from pathwalker_cli.verification.checks import verify_run
     from pathwalker_cli.verification.text import verification_lines
 
@@ -31,14 +40,14 @@ def verify_command(runs: tuple[Path, ...], as_json: bool) -> None:
         if not as_json:
             click.echo("\n".join(verification_lines(found[-1])) + "\n")
     if as_json:
-        click.echo(json_text({"runs": [each.as_dict() for each in found]}), nl=False)
+        print_json({"runs": [each.as_dict() for each in found]})
     failed = [str(each.folder) for each in found if not each.passed]
     if failed:
         raise NotConvergedError(f"{', '.join(failed)}: a check failed")
 
 
 @click.command("rerun")
-@click.argument("run", metavar="RUN", type=click.Path(path_type=Path))
+@click.argument("run", metavar="RUN", type=click.Path(path_type=Path), shell_complete=complete_runs)
 @click.option(
     "--out",
     type=click.Path(path_type=Path),

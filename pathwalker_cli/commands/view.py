@@ -6,11 +6,13 @@ from pathlib import Path
 
 import click
 
+from pathwalker_cli.commands.complete import complete_runs
+
 __all__ = ["view_command"]
 
 
 @click.command("view")
-@click.argument("run", metavar="RUN", type=click.Path(path_type=Path))
+@click.argument("run", metavar="RUN", type=click.Path(path_type=Path), shell_complete=complete_runs)
 @click.option(
     "--strides",
     type=click.IntRange(1, 1000),

@@ -62,7 +62,9 @@ def reasons(path: Path) -> dict[str, str]:
 def entries(path: Path) -> tuple[Entry, ...]:
     """Return every key of a YAML file in order, values as they are written there."""
     text = path.read_text(encoding="utf-8")
-    return tuple(_entries(yaml.compose(text, yaml.SafeLoader), text, reasons(path), ()))
+    node = yaml.compose(text, yaml.SafeLoader)
+    assert isinstance(node, yaml.MappingNode), path
+    return tuple(_entries(node, text, reasons(path), ()))
 
 
 def _entries(

@@ -1,4 +1,4 @@
-"""What a key of a file may hold, in words: type, unit and range, from the model that validates it."""
+"""What a key of a file may hold, in words: type, unit and range, from its model."""
 
 from __future__ import annotations
 

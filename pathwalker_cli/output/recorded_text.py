@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from rich.console import RenderableType
@@ -13,6 +14,7 @@ from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.inverse.study_tables import ResidualTable, StrengthTable
 
 __all__ = [
+    "dynamics_content",
     "residuals_renderable",
     "stance_notes",
     "strengths_renderable",
@@ -39,6 +41,41 @@ def trials_renderable(trials: Iterable[StudyTrial]) -> Table:
             row.append(f"{1e3 * trial.markers.mean:.1f}" if trial.markers else "-")
         table.add_row(*row)
     return table
+
+
+def dynamics_content(
+    trials: Iterable[StudyTrial], tables: Iterable[ResidualTable], strengths: StrengthTable
+) -> dict[str, Any]:
+    """Return trials, mean residuals [N, N, N m] and strengths [N m] as plain values."""
+    return {
+        "trials": [
+            {
+                "condition": trial.condition,
+                "trial": trial.name,
+                "frames": int(trial.motion.time.size),
+                "strides": len(trial.cycles),
+                "measured_stances": [
+                    item.stance.side for item in trial.stances if item.measured
+                ],
+            }
+            for trial in trials
+        ],
+        "mean_residuals": [
+            {
+                "condition": table.condition,
+                "part": table.part,
+                "trials": len(table.trials),
+                "forward_up_moment": None if table.range is None else table.range.mean.tolist(),
+            }
+            for table in tables
+        ],
+        "strengths": {
+            row.generator: {"value": float(row.value), "patient_file": row.given,
+                            "remark": row.remark}
+            for row in strengths.rows
+        },
+        "strengths_reason": strengths.reason,
+    }  # fmt: skip
 
 
 def residuals_renderable(tables: Sequence[ResidualTable]) -> Table:

@@ -10,12 +10,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from pathwalker_cli.errors import PatientError
 from pathwalker_cli.model.healthy import healthy_child, healthy_strength
+from pathwalker_cli.patient import JENSEN_AGES
 
 __all__ = ["AGE", "Child", "made_child"]
 
 AGE: Final = 9.0
 """Age of a child of which nothing is said [years]."""
+
+_OTHER_AGES: Final = "for another age begin with one of these, and see age_for_regressions there"
 
 _SHARES: Final = {
     "hip_extension": (0.55, 0.65),
@@ -69,8 +73,15 @@ def made_child(
         age: Age [years].
         mass: Body mass [kg].
         height: Height [m].
+
+    Raises:
+        PatientError: If the regressions of the segment masses do not hold for the age.
     """
     age = AGE if age is None else age
+    if not JENSEN_AGES.lower <= age <= JENSEN_AGES.upper:
+        raise PatientError(
+            f"is {age:g} years", where="--age", allowed=JENSEN_AGES.allowed, mend=_OTHER_AGES
+        )
     usual = 2.0 * age + 8.0 if age < 7.0 else (7.0 * age - 5.0) / 2.0
     mass = round(usual, 1) if mass is None else mass
     height = round(0.06 * age + 0.77, 2) if height is None else height

@@ -102,7 +102,7 @@ def next_steps(worn: bool, example: bool) -> tuple[Step, ...]:
         f"pathwalker import c3d/{c} --patient . --condition {c} -o recordings/{c}"
         for c in conditions
     )
-    recorded = (
+    recorded: tuple[Step, ...] = (
         Step("Turn the C3D files into joint angles, events and forces.", imports),
         Step("See how well the markers fit.", ("pathwalker ik inverse-kinematics.yaml",)),
         Step(
@@ -232,7 +232,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,
+        autoescape=False,  # YAML and plain text, no HTML
     )
     fill: Mapping[str, Any] = {"fill": lambda text: textwrap.fill(text, WIDTH)}
     environment.filters |= {

@@ -20,7 +20,7 @@ from pathwalker_cli.studies.batch.table import (
 from pathwalker_cli.studies.batch.worker import Result
 from pathwalker_cli.studies.run import is_done
 
-__all__ = ["ENTRIES", "TABLE", "Ended", "Ledger"]
+__all__ = ["CASES", "ENTRIES", "TABLE", "Ended", "Ledger"]
 
 CASES: Final = "cases"
 TABLE: Final = "cases.csv"

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from pathwalker_cli.conventions import SIDES
-from pathwalker_cli.studies.batch.ledger import TABLE, Ended
+from pathwalker_cli.studies.batch.ledger import CASES, TABLE, Ended
 from pathwalker_cli.studies.batch.study import Report
 
-__all__ = ["failure_sentence", "report_text"]
+__all__ = ["failure_sentence", "report_content", "report_text"]
 
 _SHOWN: Final = 30
 """Cases that the terminal lists; the table lists all."""
@@ -27,6 +27,24 @@ def report_text(report: Report) -> str:
         lines += [f"  {case.case.name}: {_reason(case)}" for case in report.failed[:_SHOWN]]
         lines += _more(len(report.failed), "failed cases")
     return "\n".join([*lines, "", f"Written to {report.folder}"])
+
+
+def report_content(report: Report) -> dict[str, Any]:
+    """Return how every case ended as plain values; `cost` is None where it did not converge."""
+    cases = [
+        {
+            "case": ended.case.name,
+            "patient": ended.case.patient,
+            "problem": ended.case.problem,
+            "status": ended.status,
+            "converged": ended.converged,
+            "cost": (ended.metrics or {}).get("cost") if ended.converged else None,
+            "folder": str(report.folder / CASES / ended.case.name),
+            "seconds": ended.seconds,
+        }
+        for ended in report.ended
+    ]
+    return {"folder": str(report.folder), "failed": len(report.failed), "cases": cases}
 
 
 def failure_sentence(report: Report) -> str:

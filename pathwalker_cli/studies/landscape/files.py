@@ -13,7 +13,7 @@ from pathwalker_cli.studies.landscape.figures import save_landscape_figure
 from pathwalker_cli.studies.landscape.result import Landscape, Point, Region
 from pathwalker_cli.studies.measures import MEASURES, write_table
 
-__all__ = ["ENTRIES", "write_landscape"]
+__all__ = ["ENTRIES", "landscape_content", "write_landscape"]
 
 _TABLE, _SUMMARY = "landscape.csv", "landscape.json"
 
@@ -43,7 +43,7 @@ def write_landscape(folder: Path, landscape: Landscape) -> None:
     """
     (folder / "figures").mkdir(parents=True, exist_ok=True)
     write_table(folder / _TABLE, _HEADER, _rows(landscape))
-    write_json(folder / _SUMMARY, _summary(landscape))
+    write_json(folder / _SUMMARY, landscape_content(landscape))
     save_landscape_figure(folder / "figures", landscape)
 
 
@@ -60,7 +60,7 @@ def _rows(landscape: Landscape) -> Iterator[list[Any]]:
         ]  # fmt: skip
 
 
-def _summary(landscape: Landscape) -> dict[str, Any]:
+def landscape_content(landscape: Landscape) -> dict[str, Any]:
     """Return the content of the summary."""
     return {
         "problem": landscape.problem,

@@ -12,7 +12,14 @@ from pathwalker_cli.studies.measures import COMPARED, MEASURES, measure_of, writ
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
 from pathwalker_cli.studies.springs import ends
 
-__all__ = ["FILES", "paper_changes", "perturbation_lines", "verdict", "write_perturbation"]
+__all__ = [
+    "FILES",
+    "paper_changes",
+    "perturbation_content",
+    "perturbation_lines",
+    "verdict",
+    "write_perturbation",
+]
 
 FILES: Final = ("perturbation.csv", "perturbation.json")
 
@@ -51,7 +58,7 @@ def write_perturbation(result: Perturbation, folder: Path) -> None:
     base: list[Any] = ["", 1.0, None, "converged", *(result.base[key] for key in keys)]
     base += [None] * (len(keys) + len(COMPARED)) + ["the optimum", None, None]
     write_table(folder / FILES[0], header, [base, *rows])
-    write_json(folder / FILES[1], _content(result))
+    write_json(folder / FILES[1], perturbation_content(result))
 
 
 def _cells(result: Perturbation, row: Perturbed, keys: list[str]) -> list[Any]:
@@ -68,7 +75,7 @@ def _percent(share: float | None) -> float | None:
     return None if share is None else 100.0 * share
 
 
-def _content(result: Perturbation) -> dict[str, Any]:
+def perturbation_content(result: Perturbation) -> dict[str, Any]:
     """Return everything as JSON: SI units, changes as shares."""
     return {
         "problem": result.config.problem,

@@ -11,7 +11,14 @@ from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.studies.measures import MEASURES, Measure, measure_of, write_table
 from pathwalker_cli.studies.sensitivity.result import Check, Sensitivities, Sensitivity
 
-__all__ = ["FILES", "agreement", "label_of", "sensitivity_lines", "write_sensitivities"]
+__all__ = [
+    "FILES",
+    "agreement",
+    "label_of",
+    "sensitivity_content",
+    "sensitivity_lines",
+    "write_sensitivities",
+]
 
 FILES: Final = ("sensitivity.csv", "sensitivity_check.csv", "sensitivity.json")
 
@@ -51,7 +58,7 @@ def write_sensitivities(result: Sensitivities, folder: Path) -> None:
     write_table(folder / FILES[0], header, rows)
     if result.checks:
         write_table(folder / FILES[1], _CHECK_HEADER, _check_rows(result))
-    write_json(folder / FILES[2], _content(result))
+    write_json(folder / FILES[2], sensitivity_content(result))
 
 
 _CHECK_HEADER: Final = (
@@ -68,7 +75,7 @@ def _check_rows(result: Sensitivities) -> Iterator[tuple[Any, ...]]:
             yield check.place, check.step, key, own[key], found, difference, check.changed
 
 
-def _content(result: Sensitivities) -> dict[str, Any]:
+def sensitivity_content(result: Sensitivities) -> dict[str, Any]:
     """Return everything as JSON; SI units."""
     return {
         "problem": result.config.problem,

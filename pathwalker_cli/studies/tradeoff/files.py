@@ -10,7 +10,7 @@ from pathwalker_cli.studies.measures import MEASURES, write_table
 from pathwalker_cli.studies.tradeoff.figures import save_tradeoff_figure
 from pathwalker_cli.studies.tradeoff.result import Tradeoff
 
-__all__ = ["ENTRIES", "write_tradeoff"]
+__all__ = ["ENTRIES", "tradeoff_content", "write_tradeoff"]
 
 _TABLE: Final = "tradeoff.csv"
 
@@ -43,6 +43,36 @@ def write_tradeoff(folder: Path, tradeoff: Tradeoff) -> None:
     write_table(folder / _TABLE, _HEADER, _rows(tradeoff))
     if tradeoff.solved:
         save_tradeoff_figure(folder / "figures", tradeoff)
+
+
+def tradeoff_content(tradeoff: Tradeoff) -> dict[str, Any]:
+    """Return a trade-off as plain values; SI units."""
+    return {
+        "problem": tradeoff.problem,
+        "patient": tradeoff.patient,
+        "condition": tradeoff.condition,
+        "points": [
+            {
+                "walking_speed_weight": point.weight,
+                "status": point.status,
+                "mesh": point.mesh_status if point.solved else None,
+                "dominated": tradeoff.dominated(point) if point.solved else None,
+                "measures": dict(point.measures),
+                "local_optima": point.branches,
+                "iterations": point.iterations,
+            }
+            for point in tradeoff.points
+        ],
+        "front": [point.weight for point in tradeoff.front],
+        "recorded_walking_speed": None if tradeoff.recorded is None else list(tradeoff.recorded),
+        "solves": tradeoff.solves,
+        "failed_solves": tradeoff.failed_solves,
+        "median_iterations": tradeoff.median_iterations,
+        "seconds": tradeoff.seconds,
+        "seconds_refined": tradeoff.seconds_refined,
+        "sweeps": tradeoff.sweeps,
+        "sweeps_found_nothing_new": tradeoff.complete,
+    }
 
 
 def _rows(tradeoff: Tradeoff) -> Iterator[list[Any]]:

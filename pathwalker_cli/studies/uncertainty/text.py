@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -14,7 +14,13 @@ from pathwalker_cli.studies.pool import Solved
 from pathwalker_cli.studies.springs import free_springs
 from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
 
-__all__ = ["FILES", "failure_lines", "uncertainty_lines", "write_uncertainty"]
+__all__ = [
+    "FILES",
+    "failure_lines",
+    "uncertainty_content",
+    "uncertainty_lines",
+    "write_uncertainty",
+]
 
 FILES: Final = ("draws.csv", "uncertainty.csv", "correlations.csv")
 
@@ -46,6 +52,35 @@ def write_uncertainty(result: Uncertainty, folder: Path) -> None:
         ["input", *keys],
         ([name, *map(_number, row)] for name, row in zip(names, table.tolist(), strict=True)),
     )
+
+
+def uncertainty_content(result: Uncertainty) -> dict[str, Any]:
+    """Return how everything spreads as plain values; SI units."""
+    return {
+        "problem": result.config.problem,
+        "patient": result.patient,
+        "tolerance": result.config.solver.tolerance,
+        "intervals": result.intervals,
+        "seconds": result.seconds,
+        "draws": len(result.solved),
+        "failed": [end.name for end in result.failed],
+        "base": dict(result.base),
+        "stiffness_ranges": {name: list(pair) for name, pair in result.ranges.items()},
+        "spreads": {spread.measure.key: _spread_content(spread) for spread in spreads(result)},
+    }
+
+
+def _spread_content(spread: Spread) -> dict[str, Any]:
+    place, strength = _strongest(spread)
+    return {
+        "quantiles": dict(
+            zip(("0.05", "0.5", "0.95"), map(_number, spread.quantiles), strict=True)
+        ),
+        "share_at_lower_limit": spread.lower,
+        "share_at_upper_limit": spread.upper,
+        "strongest_input": place or None,
+        "rank_correlation": strength,
+    }
 
 
 def _write_draws(result: Uncertainty, path: Path) -> None:
