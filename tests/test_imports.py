@@ -28,7 +28,7 @@ LAYERS = (
     {"output"},
     {"evaluation"},
     {"studies"},
-    {"reproduce"},
+    {"reproduce", "starter", "checking"},
     {"commands"},
     {"cli"},
 )
@@ -39,7 +39,8 @@ APART = ({"ocp", "inverse"},)
 
 CONFINED = {
     "casadi": ("model", "ocp", "commands.doctor"),
-    "pinocchio": ("model", "ocp", "inverse", "output.figures.stick_figures"),
+    "jinja2": ("starter",),
+    "pinocchio": ("model", "ocp", "inverse", "output.figures.stick_figures", "starter.example"),
     "matplotlib": (
         "output.figures",
         "output.recorded_figures",
