@@ -13,6 +13,7 @@ from typing import Final
 import click
 
 from pathwalker_cli.cli import COMMANDS, NOT_CONVERGED, REFUSED, STOPPED, cli
+from pathwalker_cli.commands.examples import EXAMPLES
 
 PAGE: Final = Path(__file__).with_name("commands.md")
 
@@ -26,7 +27,8 @@ Every command with its arguments, options and exit codes.
 `pathwalker COMMAND --help` says the same on the terminal. Every config may be named by its path or,
 if it comes with PathWalker, by its name alone (`mapd-orthosis`); its keys are in
 [configuration](configuration.md). `--set KEY=VALUE` overrides one key, dotted where it is nested
-(`--set bounds.friction=0.6`), as often as needed.
+(`--set bounds.friction=0.6`), as often as needed. With `--json`, stdout holds one JSON document and
+nothing else, also for a solve that did not converge; after bad input it stays empty.
 
 | exit code | meaning |
 | --- | --- |
@@ -59,8 +61,10 @@ def _section(name: str, command: click.Command) -> str:
     lines = [f"## {name}", "", "```", f"pathwalker {name} {' '.join(words)}", "```", ""]
     lines += [_prose(command.help or ""), ""]
     options = [p for p in command.params if isinstance(p, click.Option)]
-    lines += ["| option | meaning |", "| --- | --- |"]
+    if options:
+        lines += ["| option | meaning |", "| --- | --- |"]
     lines += [f"| `{_names(option)}` | {_meaning(option)} |" for option in options]
+    lines += ["", "```", *EXAMPLES.get(name, ()), "```"]
     return "\n".join([*lines, ""])
 
 

@@ -19,8 +19,10 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.inverse.markers import MarkerSet
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematicsConfig
 from pathwalker_cli.io.commented_yaml import reasons
-from pathwalker_cli.io.described import described, is_model
+from pathwalker_cli.io.described import described, field_at, is_model
+from pathwalker_cli.patient import OrthosisData, Patient
 from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.starter.files import explained_keys
 from pathwalker_cli.studies.batch.schema import BatchStudy
 from pathwalker_cli.studies.landscape.study import LandscapeStudy
 from pathwalker_cli.studies.perturbation.study import PerturbationStudy
@@ -67,12 +69,41 @@ of `mapd-orthosis.yaml`. Keys of a patient's file are in [patient file](patient-
 """
 
 
+_PATIENT: Final = {
+    "patient": """\
+`pathwalker init DIR` writes one, with these comments. `id`, `sex`, `age`, `body_mass` and `height`
+are needed, and `strengths` for a prediction; everything else may be left out. `recorded` (speed,
+steps and joint ranges from recorded gait) is written by `pathwalker id --update-patient`.
+""",
+    "orthosis": """\
+The block `orthosis` of a patient's file, or a file of its own. `springs` may be left out.
+""",
+}
+
+
 def page() -> str:
     """Return the whole page."""
     parts = [_HEAD]
     for heading, file, model in STUDIES:
         parts += [f"## {heading}: `configs/{file}`\n", *_tables(model, reasons(CONFIGS / file))]
-    return "\n".join(parts)
+    return "\n".join([*parts, *_patient_file()])
+
+
+def _patient_file() -> Iterator[str]:
+    """Yield what can be said of a patient and an orthosis, with the words of `pathwalker init`."""
+    for heading, model in (("patient", Patient), ("orthosis", OrthosisData)):
+        yield f"## Patient file{': the orthosis' * (model is OrthosisData)}\n"
+        yield _PATIENT[heading]
+        yield "| key | type | allowed | what it is and where to measure it |"
+        yield "| --- | --- | --- | --- |"
+        for place, text in explained_keys()[heading].items():
+            field = field_at(model, place)
+            kind, allowed = described(field.annotation, list(field.metadata))
+            if place == "orthosis":
+                kind, allowed = "path, or block of the keys below", ""
+            cells = [f"`{place}`", kind, allowed or "any", text]
+            yield "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
+        yield ""
 
 
 def _tables(model: type[BaseModel], why: dict[str, str]) -> Iterator[str]:

@@ -28,7 +28,7 @@ LAYERS = (
     {"output"},
     {"evaluation", "verification"},
     {"studies"},
-    {"reproduce", "report", "animation"},
+    {"reproduce", "report", "animation", "starter", "checking"},
     {"commands"},
     {"cli"},
 )
@@ -39,8 +39,15 @@ APART = ({"ocp", "inverse"},)
 
 CONFINED = {
     "casadi": ("model", "ocp", "commands.doctor"),
-    "pinocchio": ("model", "ocp", "inverse", "output.body", "animation.viewer"),
-    "jinja2": ("animation.html", "report.html"),
+    "pinocchio": (
+        "model",
+        "ocp",
+        "inverse",
+        "output.body",
+        "animation.viewer",
+        "starter.example",
+    ),
+    "jinja2": ("animation.html", "report.html", "starter"),
     "matplotlib": (
         "animation.film",
         "output.figures",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from pathlib import Path
+from typing import get_args, get_origin
 
 import ezc3d
 import numpy as np
@@ -97,7 +98,8 @@ def keys_of(model: type[BaseModel], prefix: str = "") -> set[str]:
     """Return the dotted keys of a model down to its numbers and texts."""
     found = set()
     for name, field in model.model_fields.items():
-        kinds = (field.annotation, *getattr(field.annotation, "__args__", ()))
+        listed = get_origin(field.annotation) in (tuple, dict)
+        kinds = (field.annotation, *(() if listed else get_args(field.annotation)))
         blocks = [k for k in kinds if isinstance(k, type) and issubclass(k, BaseModel)]
         inner = next((k for k in blocks if not issubclass(k, Sides)), None)
         nested = inner is not None and name != "orthosis"
@@ -107,7 +109,7 @@ def keys_of(model: type[BaseModel], prefix: str = "") -> set[str]:
 
 def test_every_key_of_patient_and_orthosis_is_explained() -> None:
     told = explained_keys()
-    assert {k for k in keys_of(Patient) if not k.startswith("recorded.")} == told["patient"].keys()
+    assert keys_of(Patient) - {"recorded"} == told["patient"].keys()
     assert keys_of(OrthosisData) == told["orthosis"].keys()
     assert all(len(text) > 10 for texts in told.values() for text in texts.values())
 

@@ -42,8 +42,8 @@ _INTERVALS: Final = (64, 48)
 _DEGREE: Final = 3
 """Intervals that the two measured solves began with, and their collocation points."""
 
-_SPREAD: Final = (0.7, 2.0)
-"""Shares of the measured iterations between which other children and starts end: those of the
+_SPREAD: Final = (0.6, 2.0)
+"""Shares of the measured seconds between which other children and starts end: those of the
 tests' ten-year-old are 1.6 times those of the shipped patient, other starts need up to 1.9."""
 
 _VERDICT: Final = 2.0

@@ -11,7 +11,7 @@ from pathwalker_cli.checking.report import Checked, Row
 from pathwalker_cli.checking.sense import contradictions, oddities
 from pathwalker_cli.config import StudyConfig, load_config, study_patient
 from pathwalker_cli.conventions import CONDITIONS, STIFFNESSES
-from pathwalker_cli.errors import DataError, placed
+from pathwalker_cli.errors import DataError, PatientError, placed
 from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.model.healthy import healthy_strength
 from pathwalker_cli.ocp import mesh as meshing
@@ -58,11 +58,33 @@ def ready_solver(config: StudyConfig, where: str) -> GaitSolver:
         InputError: The first thing that is wrong.
     """
     with placed(where):
-        check_patient(config, study_patient(config))
-        solver = GaitSolver(config)
-        _ = solver.stride
+        check_patient(config, _patient(config))
+        solver = _solver(config)
         for error in contradictions(solver):
             raise error
+    return solver
+
+
+def _patient(config: StudyConfig) -> Patient:
+    """Return the patient; an error without a place gets that of the key."""
+    try:
+        return study_patient(config)
+    except PatientError as error:
+        where = error.where or "patient"
+        raise PatientError(
+            error.what, where=where, allowed=error.allowed, mend=error.mend
+        ) from None
+
+
+def _solver(config: StudyConfig) -> GaitSolver:
+    """Return the solver; what lacks for a recorded start is an error of the start."""
+    try:
+        solver = GaitSolver(config)
+        _ = solver.stride
+    except DataError as error:
+        key = "start.trial" if config.start.trial else "start.gait"
+        where = f"{key}: {error.where}" if error.where else key
+        raise DataError(error.what, where=where, allowed=error.allowed, mend=error.mend) from None
     return solver
 
 

@@ -112,9 +112,10 @@ def _c3d(config: RecordedConfig, patient: Patient) -> dict[str, list[str]]:
     """Return the C3D files of a study by condition, each looked into."""
     markers = load_marker_set(config.markers)
     found: dict[str, list[str]] = {}
-    for condition in config.recorded_conditions:
+    with placed("c3d"):
+        files = {c: c3d_files(config.c3d.of(c)) for c in config.recorded_conditions}
+    for condition, paths in files.items():
         names = [point.marker for point in marker_points(markers, patient, condition)]
-        paths = c3d_files(config.c3d.of(condition))
         for file in paths:
             checked_recording(file, names, patient.height)
         found[condition] = [file.stem for file in paths]

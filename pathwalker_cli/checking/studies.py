@@ -9,9 +9,9 @@ from pathwalker_cli.checking.prediction import described, patient_rows, ready_so
 from pathwalker_cli.checking.report import Checked, Row
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.errors import placed
+from pathwalker_cli.errors import ConfigError, placed
 from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.patient import load_patient
+from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.studies.base import NeighbourStudy, base_config, load_study
 from pathwalker_cli.studies.batch.cases import load_cases
 from pathwalker_cli.studies.landscape.study import LandscapeStudy, axis_values
@@ -54,11 +54,20 @@ def check_sensitivity(path: str) -> Checked:
         springs = free_springs(_ranges(solver)) if worn else ()
         places = asked_places(study, springs, patient, worn)
         for place in places:
-            if place not in STIFFNESSES:
-                varied(patient, Variation(scale={place: 1.0}))
+            _check_place(place, patient)
     solves = 2 * len(study.check)
     what = f"{len(places)} numbers asked about; two solves for each of {len(study.check)} checks"
     return _study(path, "sensitivity", solver, solves, what)
+
+
+def _check_place(place: str, patient: Patient) -> None:
+    """Refuse what is neither a spring nor a number of the patient's file."""
+    try:
+        if place not in STIFFNESSES:
+            varied(patient, Variation(scale={place: 1.0}))
+    except ConfigError as error:
+        mend = error.mend
+        raise ConfigError(error.what, where="places", allowed=error.allowed, mend=mend) from None
 
 
 def check_uncertainty(path: str) -> Checked:

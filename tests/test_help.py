@@ -1,0 +1,250 @@
+"""Help, shell completion and JSON: what the command line offers besides its results."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+from click.testing import CliRunner, Result
+
+from conftest import MadeSolution
+from pathwalker_cli.cli import COMMANDS, GROUPS, cli
+from pathwalker_cli.commands import neighbour_study
+from pathwalker_cli.commands.complete import (
+    complete_configs,
+    complete_patients,
+    complete_problems,
+    complete_runs,
+)
+from pathwalker_cli.commands.examples import EXAMPLES
+from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.ocp.solution import GaitSolution
+from pathwalker_cli.output import run_folder
+from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.studies import run as study_run
+from pathwalker_cli.studies.batch import cases, study
+from pathwalker_cli.studies.batch.ledger import Ended
+from pathwalker_cli.studies.batch.text import report_content
+
+JSON = ("solve", "perturb", "sensitivity", "uncertainty", "landscape", "tradeoff", "batch", "id",
+        "doctor", "check", "evaluate")  # fmt: skip
+
+
+def run(*words: object) -> Result:
+    """Run the command line in this process."""
+    return CliRunner().invoke(cli, [str(word) for word in words])
+
+
+def command(name: str) -> click.Command:
+    """Return a command."""
+    found = cli.get_command(click.Context(cli), name)
+    assert found is not None
+    return found
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+# Help
+
+
+def test_every_command_has_one_purpose() -> None:
+    grouped = [name for names in GROUPS.values() for name in names]
+    assert sorted(grouped) == sorted(COMMANDS)
+    text = run("--help").output
+    places = [text.index(f"\n{heading}:\n") for heading in GROUPS]
+    assert places == sorted(places)
+    assert text.endswith("Start with: pathwalker init my-child\n")
+
+
+def test_every_command_has_examples() -> None:
+    assert EXAMPLES.keys() == COMMANDS.keys()
+    assert all(1 <= len(lines) <= 3 for lines in EXAMPLES.values())
+
+
+@pytest.mark.parametrize(
+    ("name", "line"), [(name, line) for name, lines in EXAMPLES.items() for line in lines]
+)
+def test_examples_are_real(name: str, line: str) -> None:
+    assert len(line) <= 76
+    words = shlex.split(line.partition(">")[0])
+    assert words[:2] == ["pathwalker", name]
+    made = command(name).make_context(name, words[2:], resilient_parsing=False)
+    assert made.params
+    assert f"\n    {line}\n" in run(name, "--help").output
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_fits_a_terminal(name: str) -> None:
+    lines = CliRunner().invoke(cli, [name, "--help"], terminal_width=80).output.splitlines()
+    assert [line for line in lines if len(line) > 80] == []
+
+
+# Shell completion
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_prints_a_script_for_each_shell(shell: str) -> None:
+    result = run("completion", shell)
+    assert result.exit_code == 0, result.output
+    assert f"_PATHWALKER_COMPLETE={shell}_complete" in result.output
+    assert "pathwalker" in result.output
+
+
+def test_the_bash_script_is_bash() -> None:
+    script = run("completion", "bash").output
+    assert subprocess.run(["bash", "-n"], input=script, text=True, check=False).returncode == 0
+
+
+def offered(complete: Callable[..., Any], begun: str) -> list[str]:
+    """Return what is offered for a word that was begun."""
+    context = click.Context(cli)
+    return [item.value for item in complete(context, click.Argument(["x"]), begun)]
+
+
+def test_problems_configs_and_patients_complete(here: Path) -> None:
+    assert offered(complete_problems, "") == list(PROBLEMS)
+    assert offered(complete_problems, "mapd-o") == ["mapd-orthosis"]
+    (here / "mine.yaml").touch()
+    (here / "mine.txt").touch()
+    (here / "many").mkdir()
+    (here / "many" / "one.yaml").touch()
+    assert offered(complete_configs, "m") == [
+        "many/", "mine.yaml", "mapd-barefoot", "mapd-healthy", "mapd-orthosis", "mapd-ws-orthosis",
+        "markers",
+    ]  # fmt: skip
+    assert offered(complete_configs, "many/") == ["many/one.yaml"]
+    assert offered(complete_configs, "nowhere/") == []
+    assert offered(complete_patients, "sree") == [
+        "sreenivasa2017-healthy",
+        "sreenivasa2017-patient",
+    ]
+
+
+def test_runs_complete_to_their_folder(here: Path) -> None:
+    (here / "runs" / "barefoot").mkdir(parents=True)
+    (here / "runs" / "barefoot" / "metrics.json").touch()
+    (here / "runs" / "other").mkdir()
+    assert offered(complete_runs, "") == ["runs/"]
+    assert offered(complete_runs, "runs/") == ["runs/barefoot", "runs/other/"]
+
+
+def test_the_shell_gets_what_it_asks_for(tmp_path: Path) -> None:
+    """A whole process, as the shell starts it."""
+    asked = {"_PATHWALKER_COMPLETE": "bash_complete", "COMP_CWORD": "2"}
+    environment = {**os.environ, **asked, "COMP_WORDS": "pathwalker solve mapd-b"}
+    words = [sys.executable, "-c", "from pathwalker_cli.cli import main; main()"]
+    done = subprocess.run(
+        words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "plain,mapd-barefoot\n"
+
+
+# JSON
+
+
+@pytest.mark.parametrize("name", JSON)
+def test_commands_with_results_speak_json(name: str) -> None:
+    options = [word for p in command(name).params for word in p.opts]
+    assert "--json" in options
+
+
+class _Solver:
+    """Ends as it is told to."""
+
+    end: GaitSolution
+
+    def __init__(self, config: Any, observer: Any) -> None:
+        pass
+
+    def solve(self, warm_start: Any = None) -> GaitSolution:
+        return self.end
+
+
+@pytest.fixture
+def solve(
+    monkeypatch: pytest.MonkeyPatch, here: Path, made_solution: MadeSolution
+) -> Callable[..., Result]:
+    """Return a function that runs `solve --json` with a made end."""
+    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr(study_run, "GaitSolver", _Solver)
+    monkeypatch.setattr(study_run, "verdict_of", lambda solution: None)
+
+    def solve(*words: str, **changes: Any) -> Result:
+        monkeypatch.setattr(_Solver, "end", made_solution(**changes), raising=False)
+        return run("solve", "mapd-orthosis", "mapd-orthosis", "--json", *words)
+
+    return solve
+
+
+def test_a_solve_prints_one_document(solve: Callable[..., Result], here: Path) -> None:
+    result = solve("--out", "mine")
+    assert result.exit_code == 0, result.output
+    content = json.loads(result.stdout)
+    assert (content["folder"], content["status"], content["converged"]) == (
+        "mine", "converged", True,
+    )  # fmt: skip
+    assert content["metrics"] == json.loads((here / "mine" / "metrics.json").read_text("utf-8"))
+
+
+def test_a_solve_that_failed_prints_one_document_too(solve: Callable[..., Result]) -> None:
+    result = solve(status="too many iterations")
+    assert result.exit_code == 1
+    content = json.loads(result.stdout)
+    assert (content["status"], content["converged"]) == ("too many iterations", False)
+    assert result.stderr.splitlines()[-1].startswith("Error: mapd-orthosis did not converge")
+
+
+def test_bad_input_leaves_stdout_empty(solve: Callable[..., Result]) -> None:
+    result = solve("--set", "mesh.degree=two")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith("Error: ")
+
+
+def test_a_study_whose_base_fails_says_so(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any) -> None:
+        raise NotConvergedError("mapd-orthosis, on which the study stands, did not converge")
+
+    for name in ("sensitivity", "landscape", "tradeoff"):
+        module = __import__(f"pathwalker_cli.commands.{name}", fromlist=[name])
+        monkeypatch.setattr(module, "base_of", fail)
+        result = run(name, name, "--json")
+        assert result.exit_code == 1
+        content = json.loads(result.stdout)
+        assert content["converged"] is False
+        assert "on which the study stands" in content["message"]
+        assert "on which the study stands" in result.stderr
+    assert neighbour_study.base_of is not fail
+
+
+def test_inverse_dynamics_prints_one_document(here: Path) -> None:
+    result = run("id", "inverse-dynamics", "--json", "--set", "trials=['3053179']")
+    assert result.exit_code == 0, result.output
+    content = json.loads(result.stdout)
+    assert [trial["trial"] for trial in content["trials"]] == ["3053179"]
+    assert content["strengths"]["hip_extension_r"]["patient_file"] == pytest.approx(18.63684)
+    assert content["updated"] is None
+
+
+def test_a_batch_as_plain_values(tmp_path: Path) -> None:
+    first, second, *_ = cases.load_cases("cohort").cases
+    ended = (
+        Ended(first, "converged", {"cost": 1.5}, 2.0),
+        Ended(second, "failed: time", None, 1.0),
+    )
+    content = report_content(study.Report(tmp_path, ended))
+    assert content["failed"] == 1
+    assert [case["cost"] for case in content["cases"]] == [1.5, None]
+    assert content["cases"][0]["folder"] == str(tmp_path / "cases" / first.name)
