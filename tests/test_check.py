@@ -131,6 +131,14 @@ def test_patients_and_orthoses_are_checked_too(here: Path) -> None:
     assert check_file("child/orthosis.yaml").kind == "orthosis"
 
 
+def test_a_folder_that_is_called_like_a_shipped_config_does_not_hide_it(here: Path) -> None:
+    (here / "landscape").mkdir()
+    assert check_file("landscape").kind == "landscape"
+    result = run(".")
+    assert result.exit_code == 2
+    assert result.output.startswith("Error: .: Is a directory")
+
+
 def test_c3d_files_of_a_study_are_looked_into(here: Path) -> None:
     write_c3d(here / "walk.c3d")
     path = here / "angles.yaml"

@@ -59,7 +59,7 @@ def check_file(path: str, problem: str = "") -> Checked:
     if problem:
         problem_named(problem)
         return check_prediction(path, problem)
-    if path in shipped_patients() or Path(path).is_dir():
+    if path in shipped_patients() or (Path(path) / "patient.yaml").is_file():
         return recorded.check_patient_file(path)
     source = find_config(Path(path))
     mapping, _ = read_mapping(source, ConfigError)

@@ -153,7 +153,7 @@ def described(solver: GaitSolver, path: str) -> Checked:
 
 def patient_rows(patient: Patient) -> list[Row]:
     """Return who a patient is."""
-    source = f", {patient.source}" if patient.source else ""
+    source = f", {_shown(patient.source)}" if patient.source else ""
     rows = [
         ("patient", f"{patient.id}{source}"),
         (
@@ -170,6 +170,12 @@ def patient_rows(patient: Patient) -> list[Row]:
         text = "right / left, of a healthy child of this mass and height: "
         rows.append(("strengths", text + ", ".join(sides)))
     return rows
+
+
+def _shown(path: Path) -> Path:
+    """Return a path as seen from here where it lies below."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
 
 
 def patient_content(patient: Patient) -> dict[str, Any]:

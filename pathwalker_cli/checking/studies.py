@@ -41,7 +41,7 @@ def check_perturbation(path: str) -> Checked:
         springs = moved_springs(study, free_springs(_ranges(solver)))
     solves = len(springs) * len(study.factors)
     factors = ", ".join(f"{factor:g}" for factor in study.factors)
-    what = f"{len(springs)} springs x {len(study.factors)} factors ({factors})"
+    what = f"moves {', '.join(springs)}, each to {factors} times its optimum"
     return _study(path, "perturbation", solver, solves, what)
 
 

@@ -195,15 +195,19 @@ def _load(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return force (n, 3) [N] and its forward position (n,) [m] of one stance, over all frames.
 
-    The centre of pressure lies at the same share of the foot, from heel to toe.
+    The centre of pressure lies at the same share of the foot, from heel marker to toe marker, and
+    as far before the toe marker as it did: toes are longer than the marker tells.
     """
     trial, side = played.trial, stance.side
     assert trial.forces is not None
     rows = slice(stance.strike, stance.toe_off + 1)
     known = np.arange(stance.strike, stance.toe_off + 1)
     heel, toe = _foot(other.model, trial.motion.values[rows], side).T
-    share = (trial.forces[f"cop_{side[0]}_x"][rows] - heel) / (toe - heel)
-    share = np.interp(known, known[np.isfinite(share)], share[np.isfinite(share)])
+    centre = trial.forces[f"cop_{side[0]}_x"][rows]
+    seen = np.isfinite(centre)
+    centre = np.interp(known, known[seen], centre[seen])
+    share = np.clip((centre - heel) / (toe - heel), 0.0, 1.0)
+    beyond = centre - (heel + share * (toe - heel))
     inside = (played.frames >= stance.strike) & (played.frames <= stance.toe_off)
     force = np.zeros((len(played.q), 3))
     for axis, name in ((0, "x"), (2, "z")):
@@ -211,7 +215,8 @@ def _load(
         force[inside, axis] = np.interp(played.frames[inside], known, values)
     force *= child.mass / other.mass
     heel, toe = _foot(child.model, played.q, side).T
-    return force, heel + np.interp(played.frames, known, share) * (toe - heel)
+    share, beyond = (np.interp(played.frames, known, values) for values in (share, beyond))
+    return force, heel + share * (toe - heel) + beyond
 
 
 def _foot(model: pin.Model, q: np.ndarray, side: Side) -> np.ndarray:
