@@ -47,8 +47,7 @@ _ABOUT: Final = {
     "orthosis": "Needed for problems with orthoses. The same on both legs but for the stops. `orthosis:` may also "
     "be the path of a YAML file with this block, relative to the patient's file, that several patients share.",
     "recorded": "What was recorded, per condition: `recorded.barefoot` and `recorded.orthosis` have the same keys. "
-    "The barefoot ones give the bounds of "
-    "are taken.",
+    "The barefoot ones give the bounds of predictions: least walking speed and joint ranges.",
 }
 """What stands at the head of every block."""
 

@@ -320,8 +320,8 @@ def test_active_bounds_in_words(metrics: GaitMetrics) -> None:
     flat = metrics.as_dict() | {"dorsiflexion_stiffness_right": 91.9998}
     bounds = active_bounds(flat, RANGES)
     assert [str(bound) for bound in bounds] == [
-        "K_D right sits at its upper limit of 92 N m/rad: least effort wants a stiffer spring",
-        "K_P right sits at its lower limit of 10 N m/rad: least effort wants a softer spring",
+        "K_D right sits at its upper limit of 92 N m/rad: a stiffer one would cost less",
+        "K_P right sits at its lower limit of 10 N m/rad: a softer one would cost less",
     ]
     assert active_bounds(gait_metrics(stylised_series("barefoot")).as_dict(), RANGES) == ()
 

@@ -227,7 +227,7 @@ def test_without_a_verdict_the_page_says_so(made_solution: MadeSolution, tmp_pat
     assert "were not judged" in found.lines[0]
     assert {row.cells[7] for row in found.tables[0].rows} == {"not judged"}
     assert found.tables[0].rows[0].cells[2] == "50.0"
-    assert gait_page([run]).answer.startswith("Springs of least effort: K_D 50.0 N m/rad right")
+    assert gait_page([run]).answer.startswith("Springs found: K_D 50.0 N m/rad right")
 
 
 def test_a_verdict_comes_back_from_the_metrics() -> None:

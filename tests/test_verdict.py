@@ -183,3 +183,12 @@ def test_a_real_verdict_encloses_the_identified_springs() -> None:
     assert found.snapped is not None
     assert found.snapped.status == "converged"
     assert found.snapped.rise > -1e-3
+
+
+def test_real_springs_that_cost_less_than_the_optimum_are_a_warning() -> None:
+    name = INSIDE.spring
+    snapped = SnappedSprings({name: "flexible"}, {name: 40.1}, -0.026, 0.64, "converged")
+    line = text(verdict(snapped=snapped))["real springs"]
+    assert "WARNING: that is less than the optimum found" in line
+    near = replace(snapped, rise=-1e-4)
+    assert "WARNING" not in text(verdict(snapped=near))["real springs"]

@@ -139,6 +139,7 @@ class Recorder:
             tail = "\n".join(done.stdout.splitlines()[-20:])
             sys.exit(f"{tail}\n{command}: exit code {done.returncode} instead of {code}")
         text = done.stdout.replace(f"{self.folder}/", "").replace(str(self.folder), ".")
+        text = text.replace(str(Path.home()), "~")
         lines = tuple(line.rstrip() for line in text.strip("\n").splitlines())
         return Printed(lines, time.perf_counter() - began)
 

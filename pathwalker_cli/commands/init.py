@@ -44,8 +44,8 @@ def init_command(
         f"{child.height:g} m.\n\nNext:\n"
     )
     click.echo(f"{command_lines(f'cd {_quoted(folder)}', 2)}")
-    for step in next_steps(worn, example):
-        click.echo(f"\n{click.wrap_text(step.why, 80, '# ', '# ')}")
+    for number, step in enumerate(next_steps(worn, example), start=1):
+        click.echo(f"\n{click.wrap_text(f'{number}. {step.why}', 80, '# ', '# ')}")
         for command in step.commands:
             click.echo(command_lines(command, 2))
 

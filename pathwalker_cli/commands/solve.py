@@ -29,7 +29,8 @@ __all__ = ["solve_command"]
     "--out",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Run folder; runs/PROBLEM-PATIENT if left out. An earlier run in it is replaced.",
+    help="Run folder; runs/PROBLEM-PATIENT if left out, with -smoke behind it after --smoke. An "
+    "earlier run in it is replaced.",
 )
 @click.option(
     "--warm-start",
@@ -65,7 +66,8 @@ def solve_command(
     from pathwalker_cli.studies.run import run_study
 
     study, patient = _study(problem, config, changes, smoke)
-    folder = out or Path("runs") / f"{problem}-{patient.id}"
+    kind = "-smoke" if study.smoke else ""
+    folder = out or Path("runs") / f"{problem}-{patient.id}{kind}"
     with Progress(quiet) as progress:
         outcome = run_study(study, folder, warm_start, progress)
     solution = outcome.solution
@@ -120,6 +122,8 @@ def _report(outcome: Outcome, folder: Path) -> None:
     from pathwalker_cli.studies.verdict_text import verdict_lines
 
     solution, metrics, verdict = outcome
+    if solution.config.smoke:
+        click.echo("SMOKE: a quick check on a coarse mesh; its numbers are not for use.\n")
     bounds = active_bounds(metrics, stiffness_ranges(solution)) if solution.converged else ()
     console = Console()
     if console.is_terminal:

@@ -44,7 +44,7 @@ class ActiveBound:
         """Say what it means for the result."""
         return (
             f"{self.name} sits at its {self.end} limit of {self.limit:.4g} {self.unit}: "
-            f"least effort wants a {_WISH[self.end]} spring"
+            f"a {_WISH[self.end]} one would cost less"
         )
 
 
@@ -66,6 +66,8 @@ def active_bounds(
             if value is None or limits is None:
                 continue
             low, high = limits
+            if low == high:
+                continue  # prescribed, not found
             margin, name = _ACTIVE * (high - low), f"{symbol} {side}"
             if value >= high - margin:
                 found.append(ActiveBound(name, "upper", high, "N m/rad"))

@@ -117,6 +117,8 @@ class Comparison:
             if len(set(values)) > 1:
                 pairs = zip(self.names, values, strict=True)
                 found.append(f"different {what}: {', '.join(f'{v} ({n})' for n, v in pairs)}")
+        if any(key.startswith("cost.") for key in self.config):
+            found.append("costs of different weights or goals cannot be compared")
         return tuple(found)
 
 

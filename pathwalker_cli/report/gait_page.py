@@ -73,7 +73,7 @@ def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
         share = 100.0 * effort.value / effort.barefoot
         saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot ({share:+.0f} %)"
     real = run.verdict is not None and run.verdict.snapped is not None
-    kind = "Springs to take" if real else "Springs of least effort"
+    kind = "Springs to take" if real else "Springs found"
     return f"{kind}: {_springs(run)}; predicted gait walks {gait}{saved}."
 
 

@@ -9,12 +9,12 @@ from pathwalker_cli.report.content import Fact, Row, Section, Table
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.studies.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, Verdict
-from pathwalker_cli.studies.verdict_text import per_degree, reservations, stop_text
+from pathwalker_cli.studies.verdict_text import beaten_text, per_degree, reservations, stop_text
 
 __all__ = ["recommended", "spring_section", "verdict_words"]
 
 _HEAD: Final = (
-    "spring", "take", "[N m/rad]", "[N m/deg]", "least effort [N m/rad]",
+    "spring", "take", "[N m/rad]", "[N m/deg]", "found [N m/rad]",
     f"cost within {100 * SHARE:g} % [N m/rad]",
     f"cost within {100 * SHARE:g} % [N m/deg]", "verdict",
 )  # fmt: skip
@@ -94,6 +94,7 @@ def _facts(verdict: Verdict) -> list[Fact]:
             f"solved again with these: cost {100 * snapped.rise:+.2g} %, "
             f"{snapped.walking_speed:.3f} m/s"
         )
+        real = ". ".join(filter(None, (real, beaten_text(verdict))))
     else:
         real = f"estimated cost {100 * snapped.rise:+.2g} % (solving it: {snapped.status})"
     if verdict.starts > 1:

@@ -11,7 +11,10 @@ from pathwalker_cli.conventions import to_degrees
 from pathwalker_cli.studies.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, StopVerdict, Verdict
 
-__all__ = ["per_degree", "reservations", "stop_text", "verdict_lines"]
+__all__ = ["beaten_text", "per_degree", "reservations", "stop_text", "verdict_lines"]
+
+_BEATEN: Final = 1e-3
+"""Share of the cost by which real springs must be cheaper than the optimum to say so."""
 
 _SOFTER: Final = {"lower": ("softer", -1.0), "upper": ("stiffer", 1.0)}
 
@@ -88,6 +91,17 @@ def _optima(verdict: Verdict) -> str:
     return f"{text}, with {', '.join(spread)} N m/rad"
 
 
+def beaten_text(verdict: Verdict) -> str:
+    """Return a warning where the real springs cost less than the optimum; "" where they do not."""
+    snapped = verdict.snapped
+    if snapped is None or snapped.status != "converged" or snapped.rise > -_BEATEN:
+        return ""
+    return (
+        "WARNING: that is less than the optimum found, which is therefore not the best one; "
+        "`starts: 8` looks for better ones"
+    )
+
+
 def _snapped(verdict: Verdict) -> str:
     snapped = verdict.snapped
     if snapped is None:
@@ -98,5 +112,6 @@ def _snapped(verdict: Verdict) -> str:
         for name, stiffness in snapped.stiffness.items()
     )
     if snapped.status == "converged":
-        return f"{chosen}: cost {100 * snapped.rise:+.2g} %, {snapped.walking_speed:.3f} m/s"
+        text = f"{chosen}: cost {100 * snapped.rise:+.2g} %, {snapped.walking_speed:.3f} m/s"
+        return "; ".join(filter(None, (text, beaten_text(verdict))))
     return f"{chosen}: estimated cost {100 * snapped.rise:+.2g} % (solving it: {snapped.status})"
