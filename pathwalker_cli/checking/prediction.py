@@ -18,6 +18,7 @@ from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.output.run_folder import ENTRIES, check_target
+from pathwalker_cli.output.solve_text import patient_notes
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient_blocks import Strengths
 from pathwalker_cli.studies.batch.checks import check_patient
@@ -26,7 +27,6 @@ __all__ = [
     "check_prediction",
     "described",
     "patient_content",
-    "patient_notes",
     "patient_rows",
     "ready_solver",
 ]
@@ -296,13 +296,3 @@ def _output(folder: Path) -> str:
         return f"{folder} cannot be used: {error.what}; name another folder by --out"
     holds = target.exists() and bool({path.name for path in target.iterdir()} & ENTRIES)
     return f"{folder}, {'replaces the run that is there' if holds else 'a new folder'}"
-
-
-def patient_notes(patient: Patient) -> tuple[str, ...]:
-    """Return what was filled in for a patient, lengths from body proportions in one sentence."""
-    begin = "segment length "
-    lengths = [note for note in patient.notes if note.startswith(begin)]
-    names = ", ".join(note.removeprefix(begin).partition(":")[0] for note in lengths)
-    reason = lengths[0].partition(", ")[2] if lengths else ""
-    together = (f"segment lengths {names}: {reason}",) if lengths else ()
-    return (*together, *(note for note in patient.notes if note not in lengths))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pathwalker_cli.checking.prediction import patient_content, patient_notes, patient_rows
+from pathwalker_cli.checking.prediction import patient_content, patient_rows
 from pathwalker_cli.checking.report import Checked, Row
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import ConfigError, placed
@@ -20,6 +20,7 @@ from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.yaml_file import load_yaml
 from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.output.solve_text import patient_notes
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient
 
 __all__ = [

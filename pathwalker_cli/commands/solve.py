@@ -117,7 +117,12 @@ def _report(outcome: Outcome, folder: Path) -> None:
     from rich.console import Console
 
     from pathwalker_cli.output.run_metrics import stiffness_ranges
-    from pathwalker_cli.output.solve_text import detail_lines, optimum_lines, source_lines
+    from pathwalker_cli.output.solve_text import (
+        detail_lines,
+        optimum_lines,
+        patient_notes,
+        source_lines,
+    )
     from pathwalker_cli.output.text import active_bounds, summary, summary_renderable
     from pathwalker_cli.studies.verdict_text import verdict_lines
 
@@ -137,7 +142,7 @@ def _report(outcome: Outcome, folder: Path) -> None:
         click.echo()
     rows = [*optimum_lines(solution.optima), *detail_lines(solution, metrics)]
     rows += [("bounds", line) for line in source_lines(solution.bounds.sources)]
-    rows += [("patient", note) for note in solution.walker.patient.notes]
+    rows += [("patient", note) for note in patient_notes(solution.walker.patient)]
     _echo_rows(console, rows)
     click.echo(f"\nWritten to {folder}")
 

@@ -10,6 +10,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, to_degrees
 from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.ocp.verify import ActiveBound
+from pathwalker_cli.patient import Patient
 
 __all__ = [
     "bound_line",
@@ -18,6 +19,7 @@ __all__ = [
     "failure_text",
     "interesting",
     "optimum_lines",
+    "patient_notes",
     "source_lines",
 ]
 
@@ -172,3 +174,13 @@ def failure_text(solution: GaitSolution, folder: str) -> str:
         f"{solution.config.problem} did not converge: {solution.status}; {detail}; "
         f"the last iterate is in {folder}, marked as not converged"
     )
+
+
+def patient_notes(patient: Patient) -> tuple[str, ...]:
+    """Return what was filled in for a patient, lengths from body proportions in one sentence."""
+    begin = "segment length "
+    lengths = [note for note in patient.notes if note.startswith(begin)]
+    names = ", ".join(note.removeprefix(begin).partition(":")[0] for note in lengths)
+    reason = lengths[0].partition(", ")[2] if lengths else ""
+    together = (f"segment lengths {names}: {reason}",) if lengths else ()
+    return (*together, *(note for note in patient.notes if note not in lengths))
