@@ -28,7 +28,9 @@ Every command with its arguments, options and exit codes.
 if it comes with PathWalker, by its name alone (`mapd-orthosis`); its keys are in
 [configuration](configuration.md). `--set KEY=VALUE` overrides one key, dotted where it is nested
 (`--set bounds.friction=0.6`), as often as needed. With `--json`, stdout holds one JSON document and
-nothing else, also for a solve that did not converge; after bad input it stays empty.
+nothing else, also for a solve that did not converge; after bad input it stays empty. That of `solve` has `folder`,
+`status`, `converged` and `metrics` (the keys of [metrics.json](run-folder.md#metricsjson)); that of a command that
+writes a JSON file has the content of this file.
 
 | exit code | meaning |
 | --- | --- |
