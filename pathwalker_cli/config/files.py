@@ -46,7 +46,7 @@ def find_config(path: Path) -> Path:
     if not os.path.isfile(path):  # False too for what cannot be a path
         for name in (path.name, f"{path.name}.yaml"):
             candidate = shipped("configs") / name
-            if candidate.is_file() and path.parent.name in ("", "configs"):
+            if os.path.isfile(candidate) and path.parent.name in ("", "configs"):
                 return candidate
     return path
 
