@@ -344,15 +344,17 @@ def test_no_name_of_a_subject_reaches_output(tmp_path: Path) -> None:
     shutil.copytree(SHIPPED["patient"].parent, patient)
     said = ""
     for command in (
-        ["import", path, "--patient", patient, "--condition", "barefoot", "-o", tmp_path / "out"],
+        ["import", path, "--patient", patient, "--condition", "barefoot",
+         "-o", patient / "recordings" / "barefoot"],
         ["ik", "inverse-kinematics", "--set", f"c3d.barefoot=[{path}]", "--out", tmp_path / "ik"],
-        ["id", "inverse-dynamics", "--set", "conditions=[barefoot]", "--set", "source=c3d",
-         "--set", f"c3d.barefoot=[{path}]", "--out", tmp_path / "id"],
+        ["id", "inverse-dynamics", "--set", "conditions=[barefoot]",
+         "--set", f"patient={patient}", "--out", tmp_path / "id"],
         ["report", tmp_path / "id", "-o", tmp_path / "page.html"],
     ):  # fmt: skip
         done = CliRunner().invoke(cli, [str(word) for word in command])
         assert done.exit_code == 0, done.stderr
         said += done.output + done.stderr
+    assert (tmp_path / "id" / "barefoot" / "walk_torques.csv").is_file()
     written_files = [p for p in tmp_path.rglob("*") if p.is_file() and p != path]
     assert len(written_files) > 10
     said += "".join(p.read_bytes().decode("latin-1") for p in written_files)

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from broken import angles, arrays
@@ -41,17 +41,6 @@ from pathwalker_cli.output.multipliers_file import read_multipliers
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.studies.batch.schema import load_batch
-
-_CHECKS: Final = tuple(HealthCheck)
-settings.register_profile(
-    "short", max_examples=15, derandomize=True, deadline=None, database=None,
-    suppress_health_check=_CHECKS,
-)  # fmt: skip
-settings.register_profile(
-    "long", max_examples=3000, derandomize=False, deadline=None, database=None,
-    suppress_health_check=_CHECKS,
-)  # fmt: skip
-settings.load_profile("short")
 
 Read = Callable[[Path], Any]
 
@@ -181,7 +170,8 @@ def test_files_with_some_bytes_changed(name: str, seed: int) -> None:
 PLAIN: Final = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20)
     | st.sampled_from([10**400, "\0", "../../x", "<b>", "a" * 300]),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=9), inner, max_size=3),
+    lambda inner: st.lists(inner, max_size=3)
+    | st.dictionaries(st.text(max_size=9), inner, max_size=3),
     max_leaves=8,
 )  # fmt: skip
 

@@ -88,7 +88,7 @@ def read_arrays(path: Path) -> Mapping[str, np.ndarray]:
         with np.load(path, allow_pickle=False) as file:
             if not isinstance(file, np.lib.npyio.NpzFile):
                 raise DataError("is a single array", where=str(path), allowed="a motion of a run")
-            if sum(member.file_size for member in file.zip.infolist()) > _MOST_BYTES:
+            if _unpacked_size(path) > _MOST_BYTES:
                 what = f"holds more than {_MOST_BYTES // 1_000_000} MB"
                 raise DataError(what, where=str(path), mend=_AGAIN)
             arrays = {name: file[name] for name in file.files}
@@ -99,6 +99,12 @@ def read_arrays(path: Path) -> Mapping[str, np.ndarray]:
     if not all(isinstance(array, np.ndarray) for array in arrays.values()):
         raise DataError("holds something else than arrays", where=str(path), mend=_AGAIN)
     return arrays
+
+
+def _unpacked_size(path: Path) -> int:
+    """Return the bytes that all members of an archive take once they are unpacked."""
+    with zipfile.ZipFile(path) as archive:
+        return sum(member.file_size for member in archive.infolist())
 
 
 def _check(motion: PhasedMotion, path: str | Path) -> None:
