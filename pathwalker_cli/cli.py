@@ -191,6 +191,11 @@ class _LazyGroup(click.Group):
             if code == NOT_CONVERGED:
                 print_failure(ctx, str(error))
             _fail(ctx, str(error), code)
+        except BrokenPipeError:
+            raise  # who reads the output went away: click ends quietly
+        except OSError as problem:
+            place = f"{problem.filename}: " if problem.filename else ""
+            _fail(ctx, f"{place}{problem.strerror or problem}", REFUSED)
         except KeyboardInterrupt:
             _fail(ctx, "stopped by the user before there was anything to keep", STOPPED)
 

@@ -41,7 +41,12 @@ class InputError(PathwalkerError):
             parts.append(f"allowed: {allowed}")
         if mend:
             parts.append(mend)
-        super().__init__("; ".join(parts))
+        super().__init__(_one_line("; ".join(parts)))
+
+
+def _one_line(text: str) -> str:
+    """Return a text with line ends and control characters, e.g. from a file, as their codes."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 @contextmanager

@@ -5,6 +5,7 @@ SI units and radians; angles carry the signs of `conventions` (+ankle = plantarf
 
 from __future__ import annotations
 
+import os
 import re
 from functools import cached_property
 from pathlib import Path
@@ -238,9 +239,9 @@ def _patient_file(id_or_path: str | Path) -> Path:
     if str(id_or_path) in shipped_patients():
         return shipped("patient_data") / str(id_or_path) / "patient.yaml"
     path = Path(id_or_path)
-    if path.is_dir():
+    if os.path.isdir(path):  # False too for what cannot be a path
         return path / "patient.yaml"
-    if path.is_file():
+    if os.path.isfile(path):
         return path
     raise PatientError(
         f"no patient '{id_or_path}'",

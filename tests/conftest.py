@@ -12,6 +12,7 @@ os.environ["MPLBACKEND"] = "Agg"
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from helpers import stylised_series, walker_of
 from pathwalker_cli.config import load_config
@@ -20,6 +21,20 @@ from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult
 from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
 from pathwalker_cli.ocp.verify import ActiveBound, Reintegration, Violation
 from pathwalker_cli.problems import PROBLEMS
+
+_LENGTHS = {"short": 15, "long": 3000}
+"""Examples of each property; the suite tries the same few ones every time."""
+
+for _profile, _examples in _LENGTHS.items():
+    settings.register_profile(
+        _profile,
+        max_examples=_examples,
+        derandomize=_profile == "short",
+        deadline=None,
+        database=None,
+        suppress_health_check=tuple(HealthCheck),
+    )
+settings.load_profile("short")
 
 MadeSolution = Callable[..., GaitSolution]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from pathwalker_cli.config.overrides import apply_change
@@ -42,10 +43,10 @@ def load_config(path: str | Path, problem: str = "", changes: tuple[str, ...] = 
 
 def find_config(path: Path) -> Path:
     """Return the file, or the shipped config of that name where there is no such file."""
-    if not path.is_file():
+    if not os.path.isfile(path):  # False too for what cannot be a path
         for name in (path.name, f"{path.name}.yaml"):
             candidate = shipped("configs") / name
-            if candidate.is_file() and path.parent.name in ("", "configs"):
+            if os.path.isfile(candidate) and path.parent.name in ("", "configs"):
                 return candidate
     return path
 
@@ -53,7 +54,7 @@ def find_config(path: Path) -> Path:
 def patient_path(patient: str, config_file: Path) -> str:
     """Return a patient path relative to the config's folder as a full path; ids stay."""
     candidate = config_file.parent / patient
-    return str(candidate.resolve()) if "/" in patient or candidate.is_file() else patient
+    return str(candidate.resolve()) if "/" in patient or os.path.isfile(candidate) else patient
 
 
 def study_patient(config: StudyConfig) -> Patient:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
@@ -154,7 +155,7 @@ def _load(path: str | Path, changes: tuple[str, ...], model_class: type[Config])
         folders = (source.parent, Path())
         if key in overridden:
             folders = folders[::-1]
-        found = (folder / file for folder in folders if (folder / file).exists())
+        found = (folder / file for folder in folders if os.path.exists(folder / file))
         return str(next(found, file))
 
     paths = {

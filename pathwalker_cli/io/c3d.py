@@ -6,6 +6,8 @@ Positions keep the axes of the laboratory; `inverse.direction` turns them into t
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -33,6 +35,22 @@ LEAST_FRAMES: Final = 20
 
 METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Length of the units of C3D files [m]."""
+
+_LONGEST: Final = 60.0
+"""Time to read a file [s]; a minute of walking takes less than a second."""
+_PROBE: Final = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
+resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+import ezc3d
+try:
+    ezc3d.c3d(sys.argv[1])
+except MemoryError:
+    sys.exit(3)
+"""
+"""Reads a file within 4 GB of memory."""
+_TOO_LARGE: Final = 3
+"""How that process ends if they are too few."""
 
 _KINDS: Final[dict[str, EventKind]] = {"foot strike": "foot_strike", "foot off": "toe_off"}
 _SIDES: Final[dict[str, Side]] = {"left": "left", "right": "right"}
@@ -155,11 +173,34 @@ def _open(path: Path) -> Any:
         raise DataError(
             "C3D files need ezc3d", where=str(path), mend="install it: pip install ezc3d"
         ) from None
+    _probe(path)
     try:
         return ezc3d.c3d(str(path))
     except (OSError, RuntimeError, ValueError) as problem:
         reason = str(problem).strip().splitlines()[0] if str(problem).strip() else "unreadable"
         raise DataError(f"not a C3D file: {reason}", where=str(path)) from None
+
+
+def _probe(path: Path) -> None:
+    """Refuse a file that kills its reader, fills the memory or never ends.
+
+    ezc3d is compiled and dies of some damaged files, which no exception tells; so it reads every
+    file in a process of its own first.
+    """
+    words = [sys.executable, "-P", "-c", _PROBE, str(path.resolve())]
+    what = ""
+    try:
+        done = subprocess.run(
+            words, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=_LONGEST
+        )
+        if done.returncode == _TOO_LARGE:
+            what = "is damaged or too large: reading takes more than 4 GB of memory"
+        elif done.returncode < 0:
+            what = "is damaged: its reader dies of it"
+    except subprocess.TimeoutExpired:
+        what = f"is damaged: reading does not end in {_LONGEST:g} s"
+    if what:
+        raise DataError(what, where=str(path), mend="export the recording again")
 
 
 def _value(parameters: Any, group: str, name: str, path: Path) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Sequence
 from pathlib import Path
@@ -35,12 +36,12 @@ def c3d_files(paths: Sequence[str | Path]) -> tuple[Path, ...]:
     """
     found: list[Path] = []
     for path in map(Path, paths):
-        if path.is_dir():
+        if os.path.isdir(path):  # False too for what cannot be a path
             inside = sorted(p for p in path.iterdir() if p.suffix.lower() == ".c3d")
             if not inside:
                 raise DataError("no C3D file in this folder", where=str(path), allowed="*.c3d")
             found += inside
-        elif path.is_file():
+        elif os.path.isfile(path):
             found.append(path)
         else:
             raise DataError("no such recording", where=str(path), mend="check the path")

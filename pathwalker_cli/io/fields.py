@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 
@@ -11,6 +12,8 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 __all__ = ["AS_TUPLE", "Quantity", "Sides", "YamlModel", "invalid"]
 
 T = TypeVar("T")
+
+_LARGEST: Final = sys.float_info.max
 
 
 AS_TUPLE: Final = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
@@ -70,7 +73,8 @@ class Quantity:
             raise invalid(what, allowed=self.allowed, mend=mend)
         if self.lower <= value <= self.upper:
             return float(value)
-        what = f"is {value:g} {self.unit}".rstrip()
+        shown = f"{value:g}" if abs(value) < _LARGEST else "beyond all numbers"
+        what = f"is {shown} {self.unit}".rstrip()
         mend = self.below if value < self.lower else self.above
         raise invalid(what, allowed=self.allowed, mend=mend)
 

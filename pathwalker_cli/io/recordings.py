@@ -167,7 +167,7 @@ def _event(row: list[str], place: str, frames: int) -> Event:
             where=place,
             allowed="right or left, foot_strike or toe_off",
         )
-    if not frame.isdigit() or int(frame) >= frames:
+    if not (frame.isdecimal() and len(frame) < 10) or int(frame) >= frames:
         raise DataError(f"frame is '{frame}'", where=place, allowed=f"0 to {frames - 1}")
     return Event("right" if side == "right" else "left",
                  "toe_off" if kind == "toe_off" else "foot_strike", int(frame))  # fmt: skip

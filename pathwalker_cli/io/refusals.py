@@ -30,6 +30,10 @@ _PLAIN: Final = {
 """What pydantic's types are called in a YAML file."""
 
 
+_LONGEST: Final = 80
+"""Characters of a value that a message shows."""
+
+
 def dotted(path: KeyPath) -> str:
     """Return a key path as it is written in messages: "orthosis.stiffness_range[0]"."""
     text = ""
@@ -104,6 +108,8 @@ def _clauses(problem: Any, path: KeyPath, model_class: type[BaseModel]) -> tuple
     if kind == "missing":
         keys = ", ".join(allowed_keys(model_class, problem["loc"][:-1]))
         return "this key is missing", "", f"add it; keys here: {keys}"
+    if kind == "json_invalid":
+        return f"cannot be read: {context['error']}", "", ""
     if kind == "value_error":
         return str(context["error"]), "", ""
     if kind in ("too_long", "too_short"):
@@ -120,7 +126,8 @@ def _shown(value: Any) -> str:
         return "empty"
     if isinstance(value, bool):
         return str(value).lower()
-    return "a mapping" if isinstance(value, dict) else repr(value)
+    text = "a mapping" if isinstance(value, dict) else repr(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
 def allowed_keys(model_class: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:

@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -38,6 +38,13 @@ _Loader.yaml_implicit_resolvers = {
 }
 _Loader.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+0123456789."))
 
+_MOST_BYTES: Final = 1_000_000
+"""Size of a file that is read; the largest shipped one has some 10 000 bytes."""
+_MOST_VALUES: Final = 50_000
+_DEEPEST: Final = 40
+_OF_TAGS: Final = (ValueError, LookupError, AttributeError, TypeError)
+"""What the library raises for values that do not fit an explicit tag such as `!!int`."""
+
 
 def load_yaml(
     path: str | Path, model_class: type[Model], error: type[InputError] = ConfigError
@@ -65,22 +72,7 @@ def read_mapping(
         InputError: Of class `error`, if the file is missing, is not YAML, repeats a key, or holds
             anything but a mapping of names to values.
     """
-    text = _text(Path(path), error)
-    loader = _Loader(text)
-    try:
-        node = loader.get_single_node()
-        lines = _lines(node, str(path), error)
-        content = loader.construct_document(node) if node is not None else None
-    except yaml.MarkedYAMLError as problem:
-        mark = problem.problem_mark
-        where = f"{path}, line {mark.line + 1}" if mark else str(path)
-        what = f"not valid YAML: {problem.problem or problem.context}"
-        raise error(what, where=where, mend="check indentation, colons and quotes there") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as problem:
-        reason = " ".join(str(problem).split())
-        raise error(f"not valid YAML: {reason}", where=str(path)) from None
-    finally:
-        loader.dispose()
+    content, lines = _content(_text(Path(path), error), str(path), error)
     if not isinstance(content, dict):
         found = "nothing" if content is None else f"a {type(content).__name__}"
         raise error(f"holds {found}", where=str(path), allowed="keys with values ('key: value')")
@@ -93,13 +85,34 @@ def read_value(text: str, where: str, error: type[InputError] = ConfigError) -> 
     Raises:
         InputError: Of class `error`, if the text is no YAML value.
     """
-    loader = _Loader(text)
     try:
-        return loader.get_single_data()
-    except (yaml.YAMLError, ValueError, RecursionError):
+        return _content(text, where, error)[0]
+    except error:
         raise error(f"'{text}' is not a YAML value", where=where) from None
+
+
+def _content(text: str, path: str, error: type[InputError]) -> tuple[Any, Lines]:
+    """Return the value in a text and the line of each of its keys."""
+    lines: dict[KeyPath, int] = {}
+    loader = None
+    try:
+        loader = _Loader(text)
+        node = loader.get_single_node()
+        _find_lines(node, path, error, lines)
+        return loader.construct_document(node) if node is not None else None, lines
+    except yaml.MarkedYAMLError as problem:
+        mark = problem.problem_mark
+        where = f"{path}, line {mark.line + 1}" if mark else str(path)
+        what = f"not valid YAML: {problem.problem or problem.context}"
+        raise error(what, where=where, mend="check indentation, colons and quotes there") from None
+    except RecursionError:
+        raise _too_deep(path, error) from None
+    except (yaml.YAMLError, *_OF_TAGS) as problem:
+        reason = " ".join(str(problem).split())
+        raise error(f"not valid YAML: {reason}", where=path) from None
     finally:
-        loader.dispose()
+        if loader is not None:
+            loader.dispose()
 
 
 def validate(
@@ -139,20 +152,39 @@ def validate(
 def _text(path: Path, error: type[InputError]) -> str:
     """Return the text of a file."""
     try:
-        return path.read_text(encoding="utf-8")
+        with path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+        text = content.decode("utf-8") if len(content) <= _MOST_BYTES else None
     except FileNotFoundError:
         raise error("no such file", where=str(path), mend="check the path") from None
     except UnicodeDecodeError:
         raise error("is not text in UTF-8", where=str(path), mend="save it as UTF-8") from None
     except OSError as problem:
         raise error(problem.strerror or "cannot be read", where=str(path)) from None
+    except ValueError as problem:
+        raise error(f"is no path: {problem}", where=str(path)) from None
+    if text is None:
+        what = f"is larger than {_MOST_BYTES // 1_000_000} MB"
+        raise error(what, where=str(path), mend="is it the right file?")
+    return text
 
 
-def _lines(
-    node: yaml.Node | None, where: str, error: type[InputError], prefix: KeyPath = ()
-) -> dict[KeyPath, int]:
-    """Return the line of every key below a node; refuse a key that stands twice."""
-    lines: dict[KeyPath, int] = {}
+def _find_lines(
+    node: yaml.Node | None,
+    where: str,
+    error: type[InputError],
+    lines: dict[KeyPath, int],
+    prefix: KeyPath = (),
+) -> None:
+    """Add the line of every key below a node; refuse a key that stands twice, and too much.
+
+    Aliases count as often as they are used: a few lines of them may stand for billions of values.
+    """
+    if len(prefix) > _DEEPEST:
+        raise _too_deep(where, error)
+    if len(lines) > _MOST_VALUES:
+        what = f"holds more than {_MOST_VALUES} values, aliases counted wherever they stand"
+        raise error(what, where=where, mend="is it the right file?")
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             path = (*prefix, str(key.value))
@@ -170,12 +202,15 @@ def _lines(
                     mend="remove one of them",
                 )
             lines[path] = line
-            lines.update(_lines(value, where, error, path))
+            _find_lines(value, where, error, lines, path)
     elif isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
             lines[(*prefix, index)] = item.start_mark.line + 1
-            lines.update(_lines(item, where, error, (*prefix, index)))
-    return lines
+            _find_lines(item, where, error, lines, (*prefix, index))
+
+
+def _too_deep(where: str, error: type[InputError]) -> InputError:
+    return error("is nested too deep", where=where, allowed=f"at most {_DEEPEST} levels")
 
 
 def _not_finite(value: Any, prefix: KeyPath = ()) -> KeyPath:

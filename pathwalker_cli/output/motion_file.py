@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -22,6 +24,13 @@ _ARRAYS: Final = (
     "mesh", "states", "smooth", "controls", "integrals", "inner_states", "algebraic"
 )  # fmt: skip
 _AGAIN: Final = "solve again"
+_MOST_BYTES: Final = 500_000_000
+"""Size of all arrays of a file together; those of a fine mesh take some 10 MB."""
+_DAMAGED: Final = (
+    OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, MemoryError,
+    RuntimeError, SyntaxError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What NumPy and its unzipping raise at damaged headers, sizes and contents."""
 
 
 def write_motion(path: str | Path, motion: PhasedMotion) -> None:
@@ -53,7 +62,8 @@ def read_motion(path: str | Path) -> PhasedMotion:
         if names != PHASE_NAMES:
             raise DataError("holds other phases", where=str(path), allowed=", ".join(PHASE_NAMES))
         durations = np.asarray(arrays["durations"], float)
-        if durations.shape != (len(names),) or not (durations > 0.0).all():
+        positive = np.isfinite(durations) & (durations > 0.0)
+        if durations.shape != (len(names),) or not positive.all():
             raise DataError("holds phase durations that are not positive", where=str(path))
         phases = tuple(
             PhaseMotion(name, float(duration), **{k: arrays[f"{name}.{k}"] for k in _ARRAYS})
@@ -62,6 +72,8 @@ def read_motion(path: str | Path) -> PhasedMotion:
         motion = PhasedMotion(phases, np.asarray(arrays["parameters"], float))
     except KeyError as missing:
         raise DataError(f"lacks {missing}", where=str(path), mend=_AGAIN) from None
+    except (TypeError, ValueError) as problem:
+        raise DataError(f"holds no numbers: {problem}", where=str(path), mend=_AGAIN) from None
     _check(motion, path)
     return motion
 
@@ -76,11 +88,23 @@ def read_arrays(path: Path) -> Mapping[str, np.ndarray]:
         with np.load(path, allow_pickle=False) as file:
             if not isinstance(file, np.lib.npyio.NpzFile):
                 raise DataError("is a single array", where=str(path), allowed="a motion of a run")
-            return {name: file[name] for name in file.files}
+            if _unpacked_size(path) > _MOST_BYTES:
+                what = f"holds more than {_MOST_BYTES // 1_000_000} MB"
+                raise DataError(what, where=str(path), mend=_AGAIN)
+            arrays = {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise DataError("no such file", where=str(path), mend=_AGAIN) from None
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error):
+    except _DAMAGED:
         raise DataError("is damaged or no file of a run", where=str(path), mend=_AGAIN) from None
+    if not all(isinstance(array, np.ndarray) for array in arrays.values()):
+        raise DataError("holds something else than arrays", where=str(path), mend=_AGAIN)
+    return arrays
+
+
+def _unpacked_size(path: Path) -> int:
+    """Return the bytes that all members of an archive take once they are unpacked."""
+    with zipfile.ZipFile(path) as archive:
+        return sum(member.file_size for member in archive.infolist())
 
 
 def _check(motion: PhasedMotion, path: str | Path) -> None:

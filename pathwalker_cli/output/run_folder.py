@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import tempfile
@@ -17,7 +16,7 @@ import numpy as np
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError, NotConvergedError
-from pathwalker_cli.io.json_file import write_json
+from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.recordings import write_recording
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.ocp.ipopt import Multipliers
@@ -279,22 +278,19 @@ def _file(folder: Path, name: str) -> Path:
 def _read_metrics(folder: Path) -> dict[str, Any]:
     """Return the metrics of a run."""
     path = _file(folder, _METRICS)
-    try:
-        metrics = json.loads(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise DataError("is not text in UTF-8", where=str(path), mend="solve again") from None
-    except json.JSONDecodeError as problem:
-        where = f"{path}, line {problem.lineno}"
-        raise DataError("is not valid JSON", where=where, mend="solve again") from None
+    metrics = read_json(path, mend="solve again")
     keys = ("run_format", "problem", "status", "condition", "motion_hash")
-    missing = [key for key in keys if not isinstance(metrics, dict) or key not in metrics]
+    missing = [key for key in keys if key not in metrics]
     if missing:
         raise DataError(f"lacks the key {missing[0]}", where=str(path),
                         allowed="metrics that `pathwalker solve` wrote")  # fmt: skip
+    other = [key for key in keys[1:] if not isinstance(metrics[key], str)]
+    if other:
+        raise DataError(f"{other[0]} is no text", where=str(path), mend="solve again")
     if metrics["run_format"] != RUN_FORMAT:
         raise DataError(f"has run_format {metrics['run_format']}", where=str(path),
                         allowed=str(RUN_FORMAT), mend="solve again")  # fmt: skip
-    return dict(metrics)
+    return metrics
 
 
 def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:

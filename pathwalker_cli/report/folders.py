@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,8 +9,9 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.json_file import read_json
 
-__all__ = ["STUDIES", "Kind", "Study", "folder_kind", "read_json", "sorted_folders", "studies_near"]
+__all__ = ["STUDIES", "Kind", "Study", "folder_kind", "sorted_folders", "studies_near"]
 
 Kind = Literal["run", "recorded", "cohort", "perturb", "sensitivity", "landscape"]
 
@@ -120,21 +120,6 @@ def sorted_folders(folders: Sequence[Path]) -> dict[Kind, tuple[Path, ...]]:
             mend="name the run too",
         )
     return found
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Return the content of a JSON file that holds a mapping.
-
-    Raises:
-        DataError: If it cannot be read.
-    """
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
-        raise DataError(f"cannot be read: {problem}", where=str(path)) from None
-    if not isinstance(content, dict):
-        raise DataError("is no summary of a study", where=str(path), mend="make it again")
-    return content
 
 
 def studies_near(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -64,7 +65,7 @@ def load_study(path: str | Path, model: type[Study], changes: tuple[str, ...] = 
     beside = source.parent / base
     return (
         study.model_copy(update={"base": str(beside.resolve())})
-        if base and beside.is_file()
+        if base and os.path.isfile(beside)
         else study
     )
 

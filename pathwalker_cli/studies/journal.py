@@ -98,5 +98,5 @@ def _read(path: Path, seal: str) -> NlpResult | None:
             multipliers=Multipliers(arrays["bound_multipliers"], arrays["row_multipliers"]),
             **{name: facts[name] for name in _NUMBERS},
         )
-    except (DataError, KeyError, ValueError):
+    except (DataError, KeyError, ValueError, TypeError):
         return None

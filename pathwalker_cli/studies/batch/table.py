@@ -82,7 +82,7 @@ def read_metrics(folder: Path) -> dict[str, Any] | None:
     """Return the metrics in a run folder; None if they are not there."""
     try:
         content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) and "status" in content else None
 
