@@ -221,10 +221,13 @@ def test_runs_that_lack_a_file_are_refused(name: str, fault: str, run: Path) -> 
     assert str(run) in sentence(lambda: load_run(run))
 
 
-@pytest.mark.parametrize("key", ["run_format", "problem", "status", "condition", "motion_hash"])
+@pytest.mark.parametrize(
+    "key",
+    ["run_format", "problem", "status", "condition", "motion_hash", "input_hashes", "versions"],
+)
 def test_metrics_of_another_version_or_type_are_refused(key: str, run: Path) -> None:
     content = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
-    for junk in (None, [], {}, 0):
+    for junk in (None, [], {"a": 1}, 0):
         (run / "metrics.json").write_text(json.dumps({**content, key: junk}), encoding="utf-8")
         sentence(lambda: load_run(run, allow_unconverged=True))
 

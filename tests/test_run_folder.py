@@ -238,7 +238,7 @@ def truncate(path: Path) -> None:
     ("spoil", "message"),
     [
         (lambda run: truncate(run / "metrics.json"), "metrics.json, line .*: is not valid JSON"),
-        (lambda run: (run / "metrics.json").write_text("[1]"), "lacks the key run_format"),
+        (lambda run: (run / "metrics.json").write_text("[1]"), "holds no keys with values"),
         (lambda run: (run / "metrics.json").write_text('{"a": 1}'), "lacks the key run_format"),
         (lambda run: (run / "metrics.json").write_bytes(b"\xff\xfe"), "is not text in UTF-8"),
         (lambda run: (run / "metrics.json").unlink(), "metrics.json is missing"),

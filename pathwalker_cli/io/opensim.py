@@ -69,7 +69,10 @@ def read_opensim(path: str | Path) -> Trajectory:
     rows = entries.get("nRows", str(len(values)))
     if rows.strip() != str(len(values)):
         raise DataError(f"has {len(values)} rows", where=str(path), allowed=f"nRows={rows}")
-    return Trajectory(values[:, 0], names[1:], values[:, 1:], ("",) * (len(names) - 1))
+    try:
+        return Trajectory(values[:, 0], names[1:], values[:, 1:], ("",) * (len(names) - 1))
+    except ValueError as problem:
+        raise DataError(str(problem), where=str(path)) from None
 
 
 def _numbers(lines: list[str], columns: int, path: Path) -> np.ndarray:

@@ -56,6 +56,8 @@ PATIENT: Final = "patient.yaml"
 """The patient of a run, so that the folder is enough to verify and to repeat it."""
 _METRICS, _MOTION, _RECORDINGS = "metrics.json", "motion.npz", "recordings"
 _MULTIPLIERS: Final = "multipliers.npz"
+_TEXTS: Final = ("input_hashes", "versions", "bound_sources")
+"""Metrics that are texts by key."""
 _SEAL: Final = "NOT_CONVERGED.txt"
 
 ENTRIES: Final = frozenset(
@@ -287,10 +289,18 @@ def _read_metrics(folder: Path) -> dict[str, Any]:
     other = [key for key in keys[1:] if not isinstance(metrics[key], str)]
     if other:
         raise DataError(f"{other[0]} is no text", where=str(path), mend="solve again")
+    other = [key for key in _TEXTS if not _holds_texts(metrics.get(key, {}))]
+    if other:
+        raise DataError(f"{other[0]} holds no texts by key", where=str(path), mend="solve again")
     if metrics["run_format"] != RUN_FORMAT:
         raise DataError(f"has run_format {metrics['run_format']}", where=str(path),
                         allowed=str(RUN_FORMAT), mend="solve again")  # fmt: skip
     return metrics
+
+
+def _holds_texts(value: Any) -> bool:
+    """Return whether a value maps keys to texts, or to nothing where something is not known."""
+    return isinstance(value, dict) and all(v is None or isinstance(v, str) for v in value.values())
 
 
 def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:

@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, Final, TypeVar
 
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
@@ -216,12 +217,15 @@ def verdict_of_metrics(metrics: Mapping[str, Any]) -> Verdict | None:
     except (KeyError, TypeError, AttributeError) as problem:
         what = f"is not what `pathwalker solve` wrote: {problem}"
         raise DataError(what, where="verdict in metrics.json", mend="solve again") from None
+    except ValidationError as problem:
+        what = f"holds a value of another type: {problem.errors()[0]['msg'].lower()}"
+        raise DataError(what, where="verdict in metrics.json", mend="solve again") from None
 
 
 def _part(kind: type[_Part], plain: Mapping[str, Any]) -> _Part:
-    """Return a dataclass from plain values; lists become tuples, what it does not hold is left."""
+    """Return a dataclass from plain values of its types; what it does not hold is left."""
     names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
-    return kind(**{n: tuple(v) if isinstance(v := plain[n], list) else v for n in names})
+    return TypeAdapter(kind).validate_python({name: plain[name] for name in names})
 
 
 class _Judge:
