@@ -465,7 +465,9 @@ def test_studies_that_do_not_fit_are_refused_when_named(runs: Path, tmp_path: Pa
     (broken / "sensitivity.json").write_text("{")
     assert page_of([runs / "mapd-orthosis"]).sections, "a study that nobody named does not matter"
     path.write_text("[]")
-    assert "is no summary" in refusal(runs / "mapd-orthosis", studies / "sensitivity", "-o", out)
+    assert "holds no keys with values" in refusal(
+        runs / "mapd-orthosis", studies / "sensitivity", "-o", out
+    )
 
 
 # Cohorts
