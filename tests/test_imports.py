@@ -47,7 +47,7 @@ CONFINED = {
         "animation.viewer",
         "starter.example",
     ),
-    "jinja2": ("animation.html", "report.html", "starter"),
+    "jinja2": ("io.templates", "animation.html", "report.html", "starter"),
     "matplotlib": (
         "animation.film",
         "output.figures",

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any, Final
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Template
 
 from pathwalker_cli.animation.drawing import (
     Drawing,
@@ -31,6 +31,7 @@ from pathwalker_cli.animation.look import (
     subtitle,
 )
 from pathwalker_cli.conventions import GENERATORS
+from pathwalker_cli.io.templates import templates
 from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.output.figures.style import BODY_COLOUR, FORCE_COLOUR
 
@@ -72,14 +73,7 @@ def html_page(runs: Sequence[GaitFrames]) -> str:
 @cache
 def _template() -> Template:
     """Return the template of the page."""
-    environment = Environment(
-        loader=PackageLoader("pathwalker_cli.animation", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    environment = templates("pathwalker_cli.animation", ".")
     # No spaces: the data of two strides is most of the page.
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
     return environment.get_template("page.html")

@@ -17,7 +17,7 @@ from pathwalker_cli.model.healthy import healthy_strength
 from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.output.run_folder import ENTRIES, check_target
+from pathwalker_cli.output.run_folder import ENTRIES, check_target, default_folder
 from pathwalker_cli.output.solve_text import patient_notes
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient_blocks import Strengths
@@ -103,7 +103,7 @@ def described(solver: GaitSolver, path: str) -> Checked:
     names = [phase.name for phase in solver.gait.phases]
     springs, mirrored = _free_springs(solver), config.half_cycle
     shooting = config.transcription == "multiple-shooting"
-    folder = Path("runs") / f"{config.problem}-{patient.id}"
+    folder = default_folder(config, patient.id)
     recordings = {c: recording_names(patient, c) for c in CONDITIONS}
     changed = _changed(config)
     bounds = _bounds(solver)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.complete import runs_argument
 
 __all__ = ["animate_command"]
 
@@ -15,14 +15,7 @@ _PAGE, _FILMS = ".html", (".gif", ".mp4")
 
 
 @click.command("animate")
-@click.argument(
-    "runs",
-    nargs=-1,
-    required=True,
-    metavar="RUN [RUN]",
-    type=click.Path(path_type=Path),
-    shell_complete=complete_runs,
-)
+@runs_argument("RUN [RUN]")
 @click.option(
     "-o",
     "--out",

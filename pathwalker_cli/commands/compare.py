@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.complete import runs_argument
 from pathwalker_cli.commands.json_output import json_option, print_json
 
 if TYPE_CHECKING:
@@ -17,14 +17,7 @@ __all__ = ["compare_command"]
 
 
 @click.command("compare")
-@click.argument(
-    "runs",
-    nargs=-1,
-    required=True,
-    metavar="RUN...",
-    type=click.Path(path_type=Path),
-    shell_complete=complete_runs,
-)
+@runs_argument()
 @click.option(
     "-o",
     "--out",

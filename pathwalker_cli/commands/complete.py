@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
-__all__ = ["complete_configs", "complete_patients", "complete_problems", "complete_runs"]
+__all__ = [
+    "complete_configs",
+    "complete_patients",
+    "complete_problems",
+    "complete_runs",
+    "runs_argument",
+]
 
 Complete = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
@@ -51,6 +58,18 @@ def complete_runs(
         run = (Path(path) / "metrics.json").is_file()
         found.append(path.removesuffix("/") if run else path)
     return _items(found)
+
+
+def runs_argument(metavar: str = "RUN...") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return what adds the argument `runs`, one run folder or more, to a command."""
+    return click.argument(
+        "runs",
+        nargs=-1,
+        required=True,
+        metavar=metavar,
+        type=click.Path(path_type=Path),
+        shell_complete=complete_runs,
+    )
 
 
 def _items(values: Iterable[str]) -> list[CompletionItem]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.complete import runs_argument
 from pathwalker_cli.commands.json_output import json_option, print_json
 
 if TYPE_CHECKING:
@@ -19,14 +19,7 @@ __all__ = ["evaluate_command"]
 
 
 @click.command("evaluate")
-@click.argument(
-    "runs",
-    nargs=-1,
-    required=True,
-    metavar="RUN...",
-    type=click.Path(path_type=Path),
-    shell_complete=complete_runs,
-)
+@runs_argument()
 @click.option("--trial", metavar="NAME", help="Trial to compare joint angles with at equal time.")
 @click.option(
     "-o",

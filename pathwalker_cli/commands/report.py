@@ -6,20 +6,13 @@ from pathlib import Path
 
 import click
 
-from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.complete import runs_argument
 
 __all__ = ["report_command"]
 
 
 @click.command("report")
-@click.argument(
-    "runs",
-    nargs=-1,
-    required=True,
-    metavar="RUN...",
-    type=click.Path(path_type=Path),
-    shell_complete=complete_runs,
-)
+@runs_argument()
 @click.option(
     "-o",
     "--out",

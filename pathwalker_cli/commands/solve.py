@@ -62,12 +62,12 @@ def solve_command(
     """
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
+    from pathwalker_cli.output.run_folder import default_folder
     from pathwalker_cli.output.solve_text import failure_text
     from pathwalker_cli.studies.run import run_study
 
     study, patient = _study(problem, config, changes, smoke)
-    kind = "-smoke" if study.smoke else ""
-    folder = out or Path("runs") / f"{problem}-{patient.id}{kind}"
+    folder = out or default_folder(study, patient.id)
     with Progress(quiet) as progress:
         outcome = run_study(study, folder, warm_start, progress)
     solution = outcome.solution

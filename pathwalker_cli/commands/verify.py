@@ -6,21 +6,14 @@ from pathlib import Path
 
 import click
 
-from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.complete import complete_runs, runs_argument
 from pathwalker_cli.commands.json_output import json_option, print_json
 
 __all__ = ["rerun_command", "verify_command"]
 
 
 @click.command("verify")
-@click.argument(
-    "runs",
-    nargs=-1,
-    required=True,
-    metavar="RUN...",
-    type=click.Path(path_type=Path),
-    shell_complete=complete_runs,
-)
+@runs_argument()
 @json_option
 def verify_command(runs: tuple[Path, ...], as_json: bool) -> None:
     """Check run folders from their files alone, without solving again.

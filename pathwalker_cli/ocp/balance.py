@@ -53,7 +53,8 @@ def balance(series: GaitSeries) -> Balance:
     """Return the balances of a stride."""
     walker, rows = series.walker, _node_rows(series)
     weights = series.quadrature
-    states = [_State.of(series, k) for k in range(len(series.time))]
+    data = walker.model.createData()
+    states = [_State.of(series, k, data) for k in range(len(series.time))]
     energy = np.array([state.energy for state in states])
     momentum = np.array([state.momentum for state in states])
     power = _powers(series, states)
@@ -103,10 +104,9 @@ class _State:
     contact_power: float
 
     @staticmethod
-    def of(series: GaitSeries, k: int) -> _State:
-        """Return the state of an instant."""
+    def of(series: GaitSeries, k: int, data: pin.Data) -> _State:
+        """Return the state of an instant; `data` is where Pinocchio computes."""
         model = series.walker.model
-        data = model.createData()
         q, v = np.array(series.q[k]), np.array(series.v[k])
         energy = pin.computeKineticEnergy(model, data, q, v)
         energy += pin.computePotentialEnergy(model, data, q)

@@ -44,6 +44,7 @@ __all__ = [
     "Run",
     "check_target",
     "config_text",
+    "default_folder",
     "load_run",
     "repeatable_config",
     "warm_start_run",
@@ -89,6 +90,16 @@ class Run:
 def config_text(config: StudyConfig) -> str:
     """Return a config with all defaults filled in, as YAML that `load_config` reads."""
     return yaml_text(config.model_dump(mode="json"), "The config of this run, every value written.")
+
+
+def default_folder(config: StudyConfig, patient: str) -> Path:
+    """Return where a run is written if nobody says where; a quick check stands apart.
+
+    Args:
+        config: The config.
+        patient: Id of the patient.
+    """
+    return Path("runs") / f"{config.problem}-{patient}{'-smoke' if config.smoke else ''}"
 
 
 def write_run(

@@ -21,7 +21,15 @@ from pathwalker_cli.output.metrics import gait_metrics
 from pathwalker_cli.output.versions import today, versions
 from pathwalker_cli.patient import Patient
 
-__all__ = ["RUN_FORMAT", "RunInputs", "run_inputs", "run_metrics", "sha256", "stiffness_ranges"]
+__all__ = [
+    "RUN_FORMAT",
+    "RunInputs",
+    "patient_hash",
+    "run_inputs",
+    "run_metrics",
+    "sha256",
+    "stiffness_ranges",
+]
 
 RUN_FORMAT: Final = 1
 """Number of the layout of a run folder; it grows when older ones can no longer be read."""
@@ -60,11 +68,16 @@ def run_inputs(
     """
     kept = _patient_text(patient)
     hashes = {"config": sha256(config_text.encode()), "patient_kept": sha256(kept.encode())}
-    if patient.source is not None:
-        hashes["patient"] = sha256(patient.content)
+    if (read := patient_hash(patient)) is not None:
+        hashes["patient"] = read
     if warm_start is not None:
         hashes["warm_start"] = sha256((Path(warm_start) / "motion.npz").read_bytes())
     return RunInputs(hashes, kept, "" if warm_start is None else str(warm_start))
+
+
+def patient_hash(patient: Patient) -> str | None:
+    """Return the SHA-256 of the file that a patient was read from; None if there is none."""
+    return None if patient.source is None else sha256(patient.content)
 
 
 def _patient_text(patient: Patient) -> str:

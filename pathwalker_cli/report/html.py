@@ -6,10 +6,11 @@ import re
 from functools import cache
 from typing import Final
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from markupsafe import Markup
 
 from pathwalker_cli import __version__
+from pathwalker_cli.io.templates import templates
 from pathwalker_cli.report.content import Drawing, Page
 
 __all__ = ["page_html"]
@@ -28,14 +29,7 @@ def page_html(page: Page) -> str:
 @cache
 def _environment() -> Environment:
     """Return the templates of this package, which escape everything."""
-    environment = Environment(
-        loader=PackageLoader("pathwalker_cli.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    environment = templates("pathwalker_cli.report")
     environment.filters |= {"svg": _svg, "tight": _tight}
     return environment
 

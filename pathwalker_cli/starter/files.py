@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment
 from pydantic import BaseModel
 
 from pathwalker_cli.io.described import described, field_at
+from pathwalker_cli.io.templates import templates
 from pathwalker_cli.model.proportions import ANKLE_HEIGHT, HEEL_SHARE, TOE_SHARE, default_length
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient_blocks import OrthosisData
@@ -226,14 +227,7 @@ def _pair(*values: float) -> str:
 
 def _environment() -> Environment:
     """Return where templates come from; undefined names are errors, blank lines stay as written."""
-    environment = Environment(
-        loader=PackageLoader("pathwalker_cli.starter"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,  # YAML and plain text, no HTML
-    )
+    environment = templates("pathwalker_cli.starter", escape=False)  # YAML and plain text
     fill: Mapping[str, Any] = {"fill": lambda text: textwrap.fill(text, WIDTH)}
     environment.filters |= {
         **fill,

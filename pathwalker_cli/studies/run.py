@@ -19,7 +19,7 @@ from pathwalker_cli.output.run_folder import (
     warm_start_run,
     write_run,
 )
-from pathwalker_cli.output.run_metrics import RunInputs, run_inputs
+from pathwalker_cli.output.run_metrics import RunInputs, patient_hash, run_inputs
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.studies.verdict import Verdict, verdict_of
 from pathwalker_cli.studies.verdict_text import verdict_lines
@@ -100,7 +100,7 @@ def is_done(folder: Path, study: StudyConfig) -> bool:
         same = config_text(run.config) == config_text(study)
     except InputError:
         return False
-    now = run_inputs("", study_patient(study)).hashes.get("patient")
+    now = patient_hash(study_patient(study))
     then = run.metrics.get("input_hashes", {}).get("patient")
     sealed = (folder / "NOT_CONVERGED.txt").exists()
     return same and run.metrics["status"] == "converged" and now == then and not sealed

@@ -22,7 +22,7 @@ from pathwalker_cli.ocp.optimality import optimality
 from pathwalker_cli.ocp.series import GaitSeries, gait_series
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.ocp.verify import equation_residual, reintegrate, second_engine_residual
-from pathwalker_cli.output.metrics import gait_metrics
+from pathwalker_cli.output.metrics import GaitMetrics, gait_metrics
 from pathwalker_cli.output.run_folder import CONFIG, PATIENT, Run, load_run, repeatable_config
 from pathwalker_cli.output.run_metrics import sha256
 from pathwalker_cli.output.tables import TABLES
@@ -111,10 +111,11 @@ def verify_run(folder: str | Path) -> Verification:
     config = repeatable_config(run)
     solver = GaitSolver(config)
     series = gait_series(solver.walker, run.motion)
+    numbers = gait_metrics(series)
     checks = (
         *_files(run, series),
-        *_numbers(run, solver, series),
-        *_dynamics(run, config, series),
+        *_numbers(run, solver, numbers),
+        *_dynamics(run, config, series, numbers),
         *_solution(run, solver),
     )
     return Verification(Path(folder), config.problem, solver.walker.patient.id, checks)
@@ -177,10 +178,10 @@ def _difference(one: str, two: str, scale: float) -> float:
     return difference if math.isfinite(difference) else math.inf
 
 
-def _numbers(run: Run, solver: GaitSolver, series: GaitSeries) -> Iterator[Check]:
+def _numbers(run: Run, solver: GaitSolver, numbers: GaitMetrics) -> Iterator[Check]:
     """Yield whether metrics.json says what follows from the motion."""
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
-    made: dict[str, Any] = gait_metrics(series).as_dict()
+    made: dict[str, Any] = numbers.as_dict()
     if run.config.transcription == "collocation":
         terms = cost_terms(run.motion, solver.gait, solver.weights, solver.samples)
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
@@ -227,7 +228,9 @@ def _apart(one: Any, two: Any) -> float:
     return 0.0 if one == two else math.inf
 
 
-def _dynamics(run: Run, config: StudyConfig, series: GaitSeries) -> Iterator[Check]:
+def _dynamics(
+    run: Run, config: StudyConfig, series: GaitSeries, numbers: GaitMetrics
+) -> Iterator[Check]:
     """Yield engines, integrator and conservation laws."""
     if config.transcription != "collocation":
         yield Check("dynamics", None, 0.0, "", _SHOOTING)
@@ -255,7 +258,7 @@ def _dynamics(run: Run, config: StudyConfig, series: GaitSeries) -> Iterator[Che
     )
     for name, share, limit in shares:
         yield Check(name, share if refined else None, limit, "share", note)
-    pull = max(0.0, -float(gait_metrics(series).min_vertical_force))
+    pull = max(0.0, -numbers.min_vertical_force)
     yield Check("ground pulls", pull, _EQUATIONS, "N")
 
 

@@ -1,0 +1,25 @@
+"""Templates of pages and files, read from a package."""
+
+from __future__ import annotations
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+__all__ = ["templates"]
+
+
+def templates(package: str, folder: str = "templates", *, escape: bool = True) -> Environment:
+    """Return the templates of a package; undefined names are errors.
+
+    Args:
+        package: Name of the package.
+        folder: Where in it they stand.
+        escape: Whether values are escaped as HTML; False for plain text and YAML only.
+    """
+    return Environment(
+        loader=PackageLoader(package, folder),
+        autoescape=escape,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
