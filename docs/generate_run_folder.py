@@ -152,6 +152,7 @@ ORIGIN: Final = {
     "date": "day on which the run was made",
     "versions": "PathWalker, Python and numerical libraries",
     "input_hashes": "SHA-256 of resolved config, patient file, the run's own `patient.yaml` and earlier motion",
+    "metrics_hash": "SHA-256 of all other metrics, for `verify`",
     "motion_hash": "SHA-256 of `motion.npz`",
     "multipliers_hash": "SHA-256 of `multipliers.npz`, if it was written",
 }

@@ -26,9 +26,9 @@ LAYERS = (
     {"config"},
     {"ocp", "inverse"},
     {"output"},
-    {"evaluation", "verification"},
+    {"evaluation"},
     {"studies"},
-    {"reproduce", "report", "animation", "starter", "checking"},
+    {"reproduce", "report", "animation", "starter", "checking", "verification"},
     {"commands"},
     {"cli"},
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import shutil
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from click.testing import CliRunner
 from pathwalker_cli.cli import cli
 from pathwalker_cli.output.motion_file import read_motion, write_motion
 from pathwalker_cli.output.run_metrics import sha256
+from pathwalker_cli.studies.batch.table import numbers_of, read_metrics
 from pathwalker_cli.verification.checks import Verification, verify_run
 
 
@@ -68,6 +70,13 @@ def metric(key: str, factor: float) -> Callable[[Path], None]:
     return tamper
 
 
+def noted(run: Path) -> None:
+    """Change what no motion tells."""
+    metrics = json.loads((run / "metrics.json").read_text(encoding="utf-8"))
+    metrics["active_bounds"] = []
+    (run / "metrics.json").write_text(json.dumps(metrics), encoding="utf-8")
+
+
 def moved(run: Path) -> None:
     """Change the motion itself, and its hash, tables left as they were."""
     motion = read_motion(run / "motion.npz")
@@ -98,12 +107,13 @@ def test_a_run_is_in_order_wherever_it_stands(run: Path) -> None:
         (table_cell("forces.csv"), {"forces.csv"}),
         (metric("walking_speed", 1.001), {"metrics.json"}),
         (metric("cost", 0.99), {"metrics.json"}),
+        (noted, {"metrics.json, all of it"}),
         (replaced("patient.yaml", "height: 1.25", "height: 1.26"), {"patient.yaml"}),
         (replaced("config.resolved.yaml", "friction: 0.8", "friction: 0.7"),
          {"config.resolved.yaml"}),
         (moved, {"states.csv", "numeric Pinocchio", "rows and bounds"}),
     ],
-    ids=["table", "forces", "metric", "cost", "patient", "config", "motion"],
+    ids=["table", "forces", "metric", "cost", "note", "patient", "config", "motion"],
 )  # fmt: skip
 def test_what_was_tampered_with_is_found(
     run: Path, tamper: Callable[[Path], None], names: set[str]
@@ -136,3 +146,44 @@ def test_a_run_comes_out_again_to_the_last_bit(run: Path) -> None:
         assert (again / name).read_bytes() == (run / name).read_bytes(), name
     one, two = (np.load(folder / "multipliers.npz") for folder in (run, again))
     assert all(np.array_equal(one[key], two[key]) for key in one.files)
+
+
+def cohort(folder: Path, *runs: Path) -> Path:
+    """Write the folder of a batch, one case per run."""
+    rows = []
+    for run in runs:
+        shutil.copytree(run, folder / "cases" / run.name)
+        metrics = read_metrics(run)
+        assert metrics is not None
+        cells = {"case": run.name, "patient": metrics["patient"], "status": metrics["status"]}
+        rows.append(cells | numbers_of(metrics["status"], metrics))
+    rows.append({"case": "lost", "patient": "anna", "status": "failed: memory"})
+    with (folder / "cases.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), restval="")
+        writer.writeheader()
+        writer.writerows(rows)
+    return folder
+
+
+def test_a_batch_stands_for_its_runs_and_its_table_is_checked(run: Path, tmp_path: Path) -> None:
+    folder = cohort(tmp_path / "cohort", run)
+    told = CliRunner().invoke(cli, ["verify", str(folder), "--json"])
+    assert told.exit_code == 0, told.output
+    table, case = json.loads(told.stdout)["runs"]
+    assert table["problem"] == "table of 2 cases"
+    assert Path(case["folder"]).name == run.name
+    assert "table of 2 cases\n ok" in CliRunner().invoke(cli, ["verify", str(folder)]).output
+    text = (folder / "cases.csv").read_text(encoding="utf-8")
+    speed = f"{read_metrics(run)['walking_speed']:.9g}"
+    (folder / "cases.csv").write_text(text.replace(speed, "0.7", 1), encoding="utf-8")
+    done = CliRunner().invoke(cli, ["verify", str(folder)])
+    assert done.exit_code == 1
+    assert "FAILED  cases.csv" in done.output
+    assert f"{run.name} not as in its metrics.json" in done.output
+
+
+def test_a_folder_that_cannot_be_read_does_not_hide_the_others(run: Path, tmp_path: Path) -> None:
+    done = CliRunner().invoke(cli, ["verify", str(tmp_path / "nothing"), str(run)])
+    assert done.exit_code == 2
+    assert "no such folder" in done.output
+    assert "All checks passed." in done.output

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import click
@@ -15,28 +17,45 @@ __all__ = ["rerun_command", "verify_command"]
 @click.command("verify")
 @runs_argument()
 @json_option
-def verify_command(runs: tuple[Path, ...], as_json: bool) -> None:
+@click.pass_context
+def verify_command(context: click.Context, runs: tuple[Path, ...], as_json: bool) -> None:
     """Check run folders from their files alone, without solving again.
 
-    Tables and numbers are made anew from the motion; the equations of motion are evaluated by three
-    engines, the stride is integrated anew, work is held against energy and forces against momentum,
-    and the optimality conditions are evaluated outside the solver. Exit codes: 0 all is in order, 1
-    a check failed or a run did not converge, 2 a folder cannot be read.
+    The folder of a batch or a trade-off stands for all converged runs in it. Tables and numbers are
+    made anew from the motion; the equations of motion are evaluated by three engines, the stride is
+    integrated anew, work is held against energy and forces against momentum, and the optimality
+    conditions are evaluated outside the solver. Exit codes: 0 all is in order, 1 a check failed or
+    a run did not converge, 2 a folder cannot be read.
     """
-    from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.verification.checks import verify_run
+    from pathwalker_cli.errors import NotConvergedError, PathwalkerError
+    from pathwalker_cli.verification.checks import Verification, verify_run
+    from pathwalker_cli.verification.folders import runs_in, verify_table
     from pathwalker_cli.verification.text import verification_lines
 
-    found = []
-    for folder in runs:
-        found.append(verify_run(folder))
-        if not as_json:
-            click.echo("\n".join(verification_lines(found[-1])) + "\n")
+    found: list[Verification] = []
+    refused: list[PathwalkerError] = []
+    steps: list[Callable[[], Verification | None]]
+    steps = [partial(verify_table, folder) for folder in runs]
+    steps += [partial(verify_run, run) for folder in runs for run in runs_in(folder)]
+    for step in steps:
+        try:
+            verification = step()
+        except PathwalkerError as error:  # the others are looked at all the same
+            refused.append(error)
+            click.echo(f"Error: {error}", err=True)
+            continue
+        if verification is not None:
+            found.append(verification)
+            if not as_json:
+                click.echo("\n".join(verification_lines(verification)) + "\n")
     if as_json:
-        print_json({"runs": [each.as_dict() for each in found]})
+        verified = [each.as_dict() for each in found]
+        print_json({"runs": verified, "refused": [str(error) for error in refused]})
     failed = [str(each.folder) for each in found if not each.passed]
     if failed:
-        raise NotConvergedError(f"{', '.join(failed)}: a check failed")
+        click.echo(f"Error: {', '.join(failed)}: a check failed", err=True)
+    damaged = any(not isinstance(error, NotConvergedError) for error in refused)
+    context.exit(2 if damaged else 1 if failed or refused else 0)
 
 
 @click.command("rerun")

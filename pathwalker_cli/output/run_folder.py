@@ -29,8 +29,10 @@ from pathwalker_cli.output.motion_file import read_motion, write_motion
 from pathwalker_cli.output.multipliers_file import read_multipliers, write_multipliers
 from pathwalker_cli.output.recorded_reference import recorded_reference
 from pathwalker_cli.output.run_metrics import (
+    METRICS_HASH,
     RUN_FORMAT,
     RunInputs,
+    metrics_hash,
     run_inputs,
     run_metrics,
     sha256,
@@ -140,6 +142,7 @@ def write_run(
         _write_series(staging, solution.last_iterate)
         if not solution.converged:
             (staging / _SEAL).write_text(_seal(solution), encoding="utf-8")
+        metrics[METRICS_HASH] = metrics_hash(metrics)
         write_json(staging / _METRICS, metrics)
     return metrics
 

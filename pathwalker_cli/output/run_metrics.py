@@ -13,6 +13,7 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.io.json_file import json_text
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.ocp.balance import balance
 from pathwalker_cli.ocp.goal_costs import goal_values
@@ -22,14 +23,19 @@ from pathwalker_cli.output.versions import today, versions
 from pathwalker_cli.patient import Patient
 
 __all__ = [
+    "METRICS_HASH",
     "RUN_FORMAT",
     "RunInputs",
+    "metrics_hash",
     "patient_hash",
     "run_inputs",
     "run_metrics",
     "sha256",
     "stiffness_ranges",
 ]
+
+METRICS_HASH: Final = "metrics_hash"
+"""Key of the SHA-256 of all other metrics, by which a change is found."""
 
 RUN_FORMAT: Final = 1
 """Number of the layout of a run folder; it grows when older ones can no longer be read."""
@@ -107,6 +113,11 @@ def run_metrics(solution: GaitSolution, inputs: RunInputs) -> dict[str, Any]:
         **_origin(solution, solution.config, inputs),
     }
     return {key: _strict(value) for key, value in metrics.items()}
+
+
+def metrics_hash(metrics: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of all metrics but the one that holds it."""
+    return sha256(json_text({k: v for k, v in metrics.items() if k != METRICS_HASH}).encode())
 
 
 def _outcome(solution: GaitSolution) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.ocp.verify import equation_residual, reintegrate, second_engine_residual
 from pathwalker_cli.output.metrics import GaitMetrics, gait_metrics
 from pathwalker_cli.output.run_folder import CONFIG, PATIENT, Run, load_run, repeatable_config
-from pathwalker_cli.output.run_metrics import sha256
+from pathwalker_cli.output.run_metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.output.tables import TABLES
 
 __all__ = ["Check", "Verification", "verify_run"]
@@ -66,12 +66,12 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of a run.
+    """All checks of a run, or of the table of a study.
 
     Args:
-        folder: The run folder.
-        problem: Its problem.
-        patient: Id of its patient.
+        folder: Its folder.
+        problem: Its problem, or what it is.
+        patient: Id of its patient; "" if there are several.
         checks: The checks.
     """
 
@@ -126,12 +126,21 @@ def _files(run: Run, series: GaitSeries) -> Iterator[Check]:
     hashes = run.metrics["input_hashes"]
     for name, key in ((CONFIG, "config"), (PATIENT, "patient_kept")):
         if key in hashes:
-            same = sha256((run.folder / name).read_bytes()) == hashes[key]
-            yield Check(name, float(not same), 0.0, "", "" if same else "changed since the run")
+            yield _as_written(name, hashes[key], sha256((run.folder / name).read_bytes()))
+    kept = run.metrics.get(METRICS_HASH)
+    yield _as_written("metrics.json, all of it", kept, metrics_hash(run.metrics))
     with tempfile.TemporaryDirectory() as made:
         for name, write in TABLES.items():
             write(Path(made) / name, series)
             yield _same_table(run.folder / name, Path(made) / name)
+
+
+def _as_written(name: str, before: str | None, now: str) -> Check:
+    """Return whether a file has the hash that the run keeps, if it keeps one."""
+    if before is None:
+        return Check(name, None, 0.0, "", "an older run, which keeps no hash of it")
+    same = before == now
+    return Check(name, float(not same), 0.0, "", "" if same else "changed since the run")
 
 
 def _same_table(path: Path, expected: Path) -> Check:

@@ -11,7 +11,8 @@ __all__ = ["verification_lines"]
 
 def verification_lines(verification: Verification) -> Iterator[str]:
     """Yield a heading, one line per check, and the outcome."""
-    yield f"{verification.folder}: {verification.problem}, patient {verification.patient}"
+    patient = f", patient {verification.patient}" if verification.patient else ""
+    yield f"{verification.folder}: {verification.problem}{patient}"
     for check in verification.checks:
         yield _line(check)
     failed = [check.name for check in verification.checks if not check.passed]

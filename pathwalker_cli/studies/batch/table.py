@@ -14,7 +14,7 @@ from pathwalker_cli.output.tables import DIGITS
 from pathwalker_cli.studies.batch.cases import Case
 from pathwalker_cli.studies.batch.units import unit_of
 
-__all__ = ["CONVERGED", "PENDING", "CaseTable", "read_metrics", "write_rows"]
+__all__ = ["CONVERGED", "PENDING", "CaseTable", "numbers_of", "read_metrics", "write_rows"]
 
 CONVERGED: Final = "converged"
 PENDING: Final = "not yet run"
@@ -72,10 +72,21 @@ class CaseTable:
         """
         row = [case.name, case.patient, case.problem, *map(_varied, case.values.values())]
         row += [case.variant] if self._named else []
-        found = metrics or {}
-        gait = found if status == CONVERGED else {}
-        numbers = [gait.get(name) for name in _GAIT] + [found.get(name) for name in _PROOF]
-        return (*row, status, *map(_number, numbers))
+        return (*row, status, *numbers_of(status, metrics).values())
+
+
+def numbers_of(status: str, metrics: Mapping[str, Any] | None) -> dict[str, str]:
+    """Return the numbers in the row of a case, as text by heading without unit.
+
+    Args:
+        status: "converged", or why not.
+        metrics: Content of the run's `metrics.json`; None if there is no run.
+    """
+    found = metrics or {}
+    gait = found if status == CONVERGED else {}
+    numbers = {name: gait.get(name) for name in _GAIT}
+    numbers |= {name: found.get(name) for name in _PROOF}
+    return {name: _number(value) for name, value in numbers.items()}
 
 
 def read_metrics(folder: Path) -> dict[str, Any] | None:
