@@ -128,6 +128,8 @@ PROOF: Final = {
     "balance": "work of muscles and orthoses against mechanical energy [J], impulse of gravity and ground against "
     "linear [N s] and angular [N m s] momentum: largest differences since the beginning of the stride, and what they "
     "are to be compared with ([theory](theory.md#44-balances-of-work-and-momentum))",
+    "shortfall": "of a run that found no motion: whether muscles of any strength walk within the bounds, and the "
+    "torques [N m] that the muscles lack, with strength and percent of the stride; otherwise null",
     "active_bounds": "names of the bounds that hold the solution back, with value and phases",
     "stiffness_ranges": "by stiffness, allowed range [N m/rad]",
     "bound_sources": "by quantity, its bounds and where they come from",

@@ -179,7 +179,7 @@ class MeshConfig(YamlModel):
     least_intervals_per_phase: Annotated[int, Field(ge=1, le=50)] = 2
     position_tolerance: Annotated[float, Quantity("rad or m", 1e-8, 1.0)] = 1e-3
     velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2
-    refinements: Annotated[int, Field(ge=0, le=20)] = 8
+    refinements: Annotated[int, Field(ge=0, le=20)] = 12
 
     @field_validator("intervals")
     @classmethod

@@ -12,6 +12,7 @@ from pathwalker_cli.conventions import (
     CONTACT_POINTS,
     COORDINATES,
     GRAVITY,
+    ROOT,
     STIFFNESSES,
 )
 from pathwalker_cli.errors import ConfigError
@@ -97,6 +98,16 @@ def tracking_bounds(bounds: GaitBounds, durations: np.ndarray, stiffness: np.nda
     for name, value in zip(STIFFNESSES, stiffness, strict=False):
         changes[(name,)] = (float(value), float(value))
     return bounds.table.replace(changes)
+
+
+def helped_bounds(bounds: GaitBounds) -> BoundTable:
+    """Return the bounds of a prediction with free reserves at the joints.
+
+    The pelvis gets none: nobody carries the patient.
+    """
+    free: dict[tuple[str, ...], Range]
+    free = {(name,): (-INFINITY, INFINITY) for name in RESERVES[len(ROOT) :]}
+    return bounds.table.replace(free)
 
 
 def _always() -> dict[tuple[str, ...], Range]:

@@ -42,6 +42,7 @@ def refined(
     position_tolerance: float,
     velocity_tolerance: float,
     order: int,
+    share: float = 1.0,
 ) -> tuple[np.ndarray, ...]:
     """Return a mesh in which intervals that miss the tolerances are split.
 
@@ -51,13 +52,14 @@ def refined(
         position_tolerance: Error of q to stay below [rad, m].
         velocity_tolerance: Error of v to stay below [rad/s, m/s].
         order: Order of the error in the length of an interval.
+        share: Share of the tolerances above which an interval is split.
     """
     result = []
     for mesh, position, velocity in zip(meshes, errors.position, errors.velocity, strict=True):
         ratio = np.maximum(position / position_tolerance, velocity / velocity_tolerance)
         # half the tolerance is aimed at: the next solution moves a little
         parts = np.ceil(np.clip(2.0 * ratio, 1e-9, 1e6) ** (1.0 / order))
-        parts = np.where(ratio > 1.0, np.clip(parts, 2, 4), 1).astype(int)
+        parts = np.where(ratio > share, np.clip(parts, 2, 4), 1).astype(int)
         pieces = [
             np.linspace(mesh[i], mesh[i + 1], n + 1)[:-1] for i, n in enumerate(parts.tolist())
         ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Final
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import NotConvergedError
@@ -12,6 +13,7 @@ from pathwalker_cli.ocp.gait_bounds import GaitBounds
 from pathwalker_cli.ocp.ipopt import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries, gait_series
+from pathwalker_cli.ocp.shortfall import Shortfall
 from pathwalker_cli.ocp.verify import (
     ActiveBound,
     Reintegration,
@@ -19,7 +21,10 @@ from pathwalker_cli.ocp.verify import (
     second_engine_residual,
 )
 
-__all__ = ["GaitSolution", "LocalOptimum", "StageRecord"]
+__all__ = ["TOO_WEAK", "GaitSolution", "LocalOptimum", "StageRecord"]
+
+TOO_WEAK: Final = "the muscles are too weak for a walk within the bounds"
+"""Status of a solve that found which torques are lacking."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +32,7 @@ class StageRecord:
     """One stage as it went.
 
     Args:
-        name: "tracking", "first mesh", "refined 1", ...
+        name: "tracking", "first mesh", "refined 1", "helped", ...
         status: "converged" or the reason why not.
         intervals: Mesh intervals.
         unknowns: Size of the nonlinear program.
@@ -97,6 +102,7 @@ class GaitSolution:
         stages: The stages.
         seconds: Wall seconds by part: build, solve, verify.
         optima: Where all starts ended, best first; empty for a single start.
+        shortfall: Why no motion was found, where that was looked for.
     """
 
     config: StudyConfig
@@ -114,6 +120,7 @@ class GaitSolution:
     stages: tuple[StageRecord, ...]
     seconds: dict[str, float]
     optima: tuple[LocalOptimum, ...] = ()
+    shortfall: Shortfall | None = None
 
     @property
     def converged(self) -> bool:

@@ -16,14 +16,21 @@ from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.cost_terms import cost_terms
 from pathwalker_cli.ocp.gait import Form, GaitProblem, GaitWeights
-from pathwalker_cli.ocp.gait_bounds import gait_bounds, recorded_durations, tracking_bounds
+from pathwalker_cli.ocp.gait_bounds import (
+    gait_bounds,
+    helped_bounds,
+    recorded_durations,
+    tracking_bounds,
+)
 from pathwalker_cli.ocp.goal_costs import with_goal_costs
 from pathwalker_cli.ocp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.passage import passage_samples, recorded_passage
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers, Sample
-from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
+from pathwalker_cli.ocp.series import gait_series
+from pathwalker_cli.ocp.shortfall import Shortfall, missing_torques
+from pathwalker_cli.ocp.solution import TOO_WEAK, GaitSolution, StageRecord
 from pathwalker_cli.ocp.start import ReferenceStride, reference_stride, start_recording
 from pathwalker_cli.ocp.structures import gait_blocks
 from pathwalker_cli.ocp.symmetry import full_stride, require_symmetry
@@ -42,11 +49,24 @@ _TRACKING = GaitWeights(effort=0.0, rate=0.0, tracking=10.0, reserve=10.0, smoot
 _TRACKING_TOLERANCE, _TRACKING_BARRIER = 1e-2, 0.1
 """A start need not be exact; far from any solution a large barrier takes the fewest iterations."""
 
+_HELPED = GaitWeights(effort=1e-2, rate=2e-4, acceleration=1e-5, reserve=10.0)
+"""Weights by which reserves at the joints help a solve that failed: hardly any effort matters."""
+
+_LEAST_HELP = replace(_HELPED, reserve=1e3)
+"""Weights of the least help: what is left of the reserves is what the muscles lack."""
+
+_PATIENCE = 400
+"""Iterations on the first mesh after which reserves have to help; most need 60 to 300."""
+
 _FADED = 0.02
 """Share of the orthosis that acts in the first stage."""
 
 _BARRIER_SHARE = 1e-2
 """Barrier, as a share of the tolerance of the stage before, that a warm start begins with."""
+
+_EAGER_ROUND, _EAGER_SHARE = 4, 0.3
+"""Round from which intervals are split at a share of the tolerance already: the solution moves
+from round to round, and would take the error to another interval that just met it before."""
 
 _MESHING = 1e-6
 """Relative tolerance of the integrator that a mesh is refined by; errors to find are 1e-3."""
@@ -69,6 +89,7 @@ class GaitSolver:
     seconds: dict[str, float] = field(
         default_factory=lambda: {"build": 0.0, "solve": 0.0, "verify": 0.0}
     )
+    shortfall: Shortfall | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         """Build walker, bounds and the blocks of the problem."""
@@ -209,6 +230,7 @@ class GaitSolver:
                 of the config is tracked first.
         """
         config, solver = self.config, self.config.solver
+        self.shortfall = None
         loose = max(solver.tolerance, solver.first_tolerance) if config.mesh.refinements else 0.0
         if warm_start is None:
             program, result = self._track()
@@ -220,10 +242,10 @@ class GaitSolver:
             if not config.fits:
                 warm_start = with_goal_costs(warm_start, self.gait.goals, self.walker.weight)
             kept = config.mesh.refinements > 0
-            motion = warm_start if kept else self._on_first_mesh(warm_start)
+            motion = warm_start if kept else self._first_meshed(warm_start)
             settings = self.settings(loose or solver.tolerance, solver.warm_barrier)
         if not self._interrupted:
-            program, result = self.stage("first mesh", motion, self.prediction, settings)
+            program, result = self._on_first_mesh(motion, settings)
         program, result, errors = self._refine(program, result, settings.tolerance)
         return self._finish(program, result, errors, warm_start is not None)
 
@@ -233,7 +255,44 @@ class GaitSolver:
         errors = self._reintegrated(program.to_motion(result.unknowns))
         return self._finish(program, result, errors, False)
 
-    def _on_first_mesh(self, motion: PhasedMotion) -> PhasedMotion:
+    def _on_first_mesh(
+        self, motion: PhasedMotion, settings: IpoptSettings
+    ) -> tuple[CollocationProgram, NlpResult]:
+        """Predict on the first mesh; if that fails, by way of a motion that reserves help along."""
+        helpless = self.config.fits
+        limit = settings.max_iterations if helpless else min(_PATIENCE, settings.max_iterations)
+        first = replace(settings, max_iterations=limit)
+        program, result = self.stage("first mesh", motion, self.prediction, first)
+        if result.converged or helpless or self._interrupted:
+            return program, result
+        return self._helped(motion, settings) or (program, result)
+
+    def _helped(
+        self, motion: PhasedMotion, settings: IpoptSettings
+    ) -> tuple[CollocationProgram, NlpResult] | None:
+        """Predict from a motion with reserves at the joints; if that fails, find what is lacking.
+
+        Returns None if not even reserves lead to a motion within the bounds.
+        """
+        table = helped_bounds(self.bounds)
+        program, result = self.stage("helped", motion, self.numbers(_HELPED, table), settings)
+        if not result.converged:
+            self.shortfall = None if self._interrupted else Shortfall(within_bounds=False)
+            return None
+        helped = program.to_motion(result.unknowns)
+        last = self.stage("first mesh again", helped, self.prediction, settings)
+        if last[1].converged or self._interrupted:
+            return last
+        numbers = self.numbers(_LEAST_HELP, table)
+        program, result = self.stage("least help", helped, numbers, settings)
+        if result.converged:
+            motion = program.to_motion(result.unknowns)
+            motion = full_stride(motion) if self.config.half_cycle else motion
+            missing = missing_torques(gait_series(self.walker, motion))
+            self.shortfall = Shortfall(within_bounds=True, missing=missing)
+        return last
+
+    def _first_meshed(self, motion: PhasedMotion) -> PhasedMotion:
         mesh = self.config.mesh
         return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
 
@@ -268,7 +327,8 @@ class GaitSolver:
             done = _within(errors, tolerances) and tolerance <= solver.tolerance
             if not result.converged or done or self._interrupted:
                 break
-            meshes = meshing.refined(program.meshes, errors, *tolerances, order=mesh.degree)
+            share = _EAGER_SHARE if attempt >= _EAGER_ROUND else 1.0
+            meshes = meshing.refined(program.meshes, errors, *tolerances, mesh.degree, share)
             start = program.to_motion(result.unknowns).resampled(meshes, mesh.degree)
             name, before = f"refined {attempt}", (program, result)
             program, result = self._refined(name, start, before, tolerance)
@@ -311,6 +371,8 @@ class GaitSolver:
         tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
         if result.converged and mesh.refinements and not _within(errors, tolerances):
             status = "the mesh does not reach the accuracy asked for"
+        if self.shortfall is not None and self.shortfall.too_weak:
+            status = TOO_WEAK
         motion = program.to_motion(result.unknowns)
         motion = full_stride(motion) if self.config.half_cycle else motion
         return GaitSolution(
@@ -328,6 +390,7 @@ class GaitSolver:
             start="earlier run" if warm else self.stride.name,
             stages=tuple(self.stages),
             seconds=dict(self.seconds),
+            shortfall=self.shortfall,
         )
 
 

@@ -20,6 +20,7 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.ocp.cost_terms import walked_distance
 from pathwalker_cli.ocp.ipopt import NlpResult
+from pathwalker_cli.ocp.shortfall import Shortfall
 from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum, StageRecord
 from pathwalker_cli.ocp.solve import GaitSolver
 
@@ -43,6 +44,7 @@ class _Outcome:
     meshes: tuple[np.ndarray, ...]
     stages: tuple[StageRecord, ...]
     seconds: dict[str, float]
+    shortfall: Shortfall | None
 
 
 def spread_starts(config: StudyConfig, solver: GaitSolver) -> list[StudyConfig]:
@@ -90,6 +92,7 @@ def solve_from_starts(config: StudyConfig, finished: Finished | None = None) -> 
     outcomes.sort(key=lambda o: (not o.optimum.converged, o.optimum.cost, o.optimum.start))
     best = outcomes[0]
     solver.stages, solver.seconds = list(best.stages), dict(best.seconds)
+    solver.shortfall = best.shortfall
     solution = solver.restored(best.nlp, best.meshes)
     optima = tuple(outcome.optimum for outcome in outcomes)
     return replace(solution, optima=optima, start=best.optimum.description)
@@ -130,4 +133,6 @@ def _solved(number: int, study: StudyConfig) -> _Outcome:
         seconds=float(sum(solution.seconds.values())),
     )
     meshes = last.meshes[: len(solver.gait.phases)]
-    return _Outcome(optimum, solution.nlp, meshes, solution.stages, solution.seconds)
+    return _Outcome(
+        optimum, solution.nlp, meshes, solution.stages, solution.seconds, solution.shortfall
+    )

@@ -37,6 +37,7 @@ from pathwalker_cli.output.run_metrics import (
     run_metrics,
     sha256,
 )
+from pathwalker_cli.output.solve_text import shortfall_text
 from pathwalker_cli.output.tables import TABLES
 
 __all__ = [
@@ -166,8 +167,10 @@ def _write_series(folder: Path, series: GaitSeries) -> None:
 
 def _seal(solution: GaitSolution) -> str:
     """Return what `NOT_CONVERGED.txt` says."""
+    why = solution.shortfall
     lines = [
         f"{solution.config.problem} did not converge: {solution.status}.",
+        *([] if why is None else [f"Why: {shortfall_text(why)}."]),
         "The files beside this one show the last iterate, which is no solution: do not use it.",
         "Largest violations, each in its own unit:",
         *(f"  {violation.amount:.3g}  {violation.name}" for violation in solution.violations),

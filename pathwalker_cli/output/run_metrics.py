@@ -147,6 +147,7 @@ def _proof(solution: GaitSolution, residual: float) -> dict[str, Any]:
         "reintegration_velocity_error": errors.worst_velocity,
         "second_engine_residual": residual,
         "balance": asdict(balance(solution.last_iterate)),
+        "shortfall": None if solution.shortfall is None else solution.shortfall.as_dict(),
         "active_bounds": [str(bound) for bound in solution.active],
         "stiffness_ranges": stiffness_ranges(solution),
         "bound_sources": solution.bounds.sources,

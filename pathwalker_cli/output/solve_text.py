@@ -7,7 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, to_degrees
+from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES, SUFFIX, to_degrees
+from pathwalker_cli.ocp.shortfall import Shortfall
 from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.ocp.verify import ActiveBound
 from pathwalker_cli.patient import Patient
@@ -20,6 +21,7 @@ __all__ = [
     "interesting",
     "optimum_lines",
     "patient_notes",
+    "shortfall_text",
     "source_lines",
 ]
 
@@ -157,6 +159,19 @@ def failure_text(solution: GaitSolution, folder: str) -> str:
         solution: How it ended.
         folder: Where its files are.
     """
+    why = solution.shortfall
+    parts = [] if why is None else [shortfall_text(why)]
+    if why is None or not why.too_weak:
+        parts.append(_violations_text(solution))
+    detail = "; ".join(parts)
+    return (
+        f"{solution.config.problem} did not converge: {solution.status}; {detail}; "
+        f"the last iterate is in {folder}, marked as not converged"
+    )
+
+
+def _violations_text(solution: GaitSolution) -> str:
+    """Return in words which constraints are not met, and how far off an integrator is."""
     worst = [v for v in solution.violations if not v.amount <= _MET][:3]
     if worst:
         named = ", ".join(f"{v.name} by {v.amount:.2g}" for v in worst)
@@ -170,10 +185,30 @@ def failure_text(solution: GaitSolution, folder: str) -> str:
             f", and an independent integrator misses the next node by "
             f"{errors.worst_position:.1e} (rad, m) and {errors.worst_velocity:.1e} (rad/s, m/s)"
         )
-    return (
-        f"{solution.config.problem} did not converge: {solution.status}; {detail}; "
-        f"the last iterate is in {folder}, marked as not converged"
-    )
+    return detail
+
+
+def shortfall_text(shortfall: Shortfall) -> str:
+    """Return in words why no motion was found."""
+    if not shortfall.within_bounds:
+        return "not even muscles of any strength were found to walk within the bounds"
+    if not shortfall.missing:
+        return "the muscles are strong enough, so another start may lead to a solution"
+    lacking = [
+        f"{_in_words(missing.generator)} {missing.torque:.1f} N m beyond its "
+        f"{missing.strength:.1f} N m, at {missing.percent:.0f} % of the stride"
+        for missing in shortfall.missing[:3]
+    ]
+    more = len(shortfall.missing) - len(lacking)
+    others = f"; of {more} others a smaller share" if more else ""
+    return f"the least help with which a walk was found is {', '.join(lacking)}{others}"
+
+
+def _in_words(generator: str) -> str:
+    """Return e.g. "right ankle extension" for "ankle_extension_r"."""
+    stem, _, suffix = generator.rpartition("_")
+    side = next((side for side in SIDES if SUFFIX[side] == suffix), "")
+    return f"{side} {stem}".replace("_", " ") if side else generator.replace("_", " ")
 
 
 def patient_notes(patient: Patient) -> tuple[str, ...]:
