@@ -178,6 +178,17 @@ class Patient(YamlModel):
         }
         return Sides[FootPoints](right=points["right"], left=points["left"])
 
+    @property
+    def leg_length(self) -> float:
+        """Mean distance from hip to sole of the straight bare leg [m]."""
+        soles = self.contacts("barefoot")
+        return sum(
+            self.length("thigh", side)
+            + self.length("shank", side)
+            - (soles[side].heel[1] + soles[side].toe[1]) / 2.0
+            for side in SIDES
+        ) / len(SIDES)
+
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """One sentence for everything that was filled in or overridden."""
