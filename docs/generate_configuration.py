@@ -62,7 +62,7 @@ A config is a YAML file; unknown keys, numbers outside their range and text in p
 refused with one sentence that names file, line and key. Units are SI and radians and are never
 written beside a number. Paths are relative to the config's folder; those of C3D files and markers
 may also be relative to where the command is run. `--set section.key=value` overrides a key on the
-command line. All predictions (`ls-barefoot`, `mapd-barefoot`, `mapd-ws-orthosis`, `mapd-healthy`) have the keys
+command line; paths in it are relative to where the command is run. All predictions (`ls-barefoot`, `mapd-barefoot`, `mapd-ws-orthosis`, `mapd-healthy`) have the keys
 of `mapd-orthosis.yaml`. Keys of a patient's file are in [patient file](patient-file.md).
 
 *What and why* is the comment that stands beside the key in the shipped file.

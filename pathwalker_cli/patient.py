@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from pathwalker_cli.conventions import SIDES, Condition
-from pathwalker_cli.errors import PatientError
+from pathwalker_cli.errors import PatientError, did_you_mean
 from pathwalker_cli.io.fields import Quantity, Sides, YamlModel, invalid
 from pathwalker_cli.io.yaml_file import load_yaml, read_mapping, validate
 from pathwalker_cli.model.proportions import (
@@ -257,4 +257,13 @@ def _patient_file(id_or_path: str | Path) -> Path:
     raise PatientError(
         f"no patient '{id_or_path}'",
         allowed=f"{', '.join(shipped_patients())}, a folder with patient.yaml, or a YAML file",
+        mend=did_you_mean(path.name, [*shipped_patients(), *_patients_beside(path)]),
     )
+
+
+def _patients_beside(path: Path) -> list[str]:
+    """Return the names of files and folders near a path that may hold a patient."""
+    if not os.path.isdir(path.parent):
+        return []
+    folders = [file.parent.name for file in path.parent.glob("*/patient.yaml")]
+    return [*folders, *(file.name for file in path.parent.glob("*.yaml"))]

@@ -314,7 +314,7 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     ),
     "an uncertain number that is not there": (
         lambda f: text_of(f, "base: mapd-orthosis\nquantities: {body_mas: {relative: 0.1}}\n"),
-        ("study.yaml", "has no 'body_mas'", "did you mean body_mass?"),
+        ("study.yaml", "has no 'body_mas'", "did you mean 'body_mass'?"),
     ),
     "a landscape upside down": (
         lambda f: text_of(f, "base: mapd-orthosis\nside: left\ndorsiflexion: {from: 100.0}\n"),

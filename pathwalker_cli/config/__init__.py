@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
-from pathwalker_cli.config.files import find_config, load_config, patient_path, study_patient
+from pathwalker_cli.config.files import (
+    find_config,
+    load_config,
+    patient_path,
+    place_of,
+    read_config,
+    study_patient,
+)
 from pathwalker_cli.config.overrides import apply_change, smoke_version, with_values
 from pathwalker_cli.config.schema import (
     BoundsConfig,
@@ -26,6 +33,8 @@ __all__ = [
     "find_config",
     "load_config",
     "patient_path",
+    "place_of",
+    "read_config",
     "smoke_version",
     "study_patient",
     "with_values",
