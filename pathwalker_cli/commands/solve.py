@@ -62,12 +62,16 @@ def solve_command(
     """
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
+    from pathwalker_cli.output.orthosis_text import orthosis_rows
     from pathwalker_cli.output.run_folder import default_folder
     from pathwalker_cli.output.solve_text import failure_text
     from pathwalker_cli.studies.run import run_study
 
     study, patient = _study(problem, config, changes, smoke)
     folder = out or default_folder(study, patient.id)
+    if study.condition == "orthosis" and patient.orthosis is not None and not quiet:
+        # Before minutes are spent: a wrong sign of an angle is seen in its direction.
+        click.echo("\n".join(f"{a}: {b}" for a, b in orthosis_rows(patient.orthosis)), err=True)
     with Progress(quiet) as progress:
         outcome = run_study(study, folder, warm_start, progress)
     solution = outcome.solution
@@ -84,11 +88,17 @@ def _study(
 ) -> tuple[StudyConfig, Patient]:
     """Return the config with all overrides, and its patient."""
     from pathwalker_cli.config import load_config, smoke_version, study_patient
-    from pathwalker_cli.errors import PatientError
+    from pathwalker_cli.errors import ConfigError, PatientError
     from pathwalker_cli.problems import problem_named
 
     problem_named(problem)
-    study = load_config(path, problem, changes)
+    try:
+        study = load_config(path, problem, changes)
+    except ConfigError:
+        from pathwalker_cli.checking.kinds import meant_as_prediction
+
+        with meant_as_prediction(path):
+            raise
     try:
         patient = study_patient(study)
     except PatientError as error:
