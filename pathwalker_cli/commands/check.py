@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs, complete_problems
+from pathwalker_cli.commands.complete import complete_configs, complete_problems, set_option
 from pathwalker_cli.commands.json_output import json_option, print_json
 
 if TYPE_CHECKING:
@@ -28,9 +28,7 @@ _REFUSED = 2
     help="Problem that every CONFIG must be of.",
     shell_complete=complete_problems,
 )
-@click.option(
-    "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Override a value of every CONFIG."
-)
+@set_option("Override a value of every CONFIG.")
 @json_option
 @click.pass_context
 def check_command(

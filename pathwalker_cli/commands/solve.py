@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs, complete_problems, complete_runs
+from pathwalker_cli.commands.complete import (
+    complete_configs,
+    complete_problems,
+    complete_runs,
+    set_option,
+)
 from pathwalker_cli.commands.json_output import json_option, print_json
 
 if TYPE_CHECKING:
@@ -40,9 +45,7 @@ __all__ = ["solve_command"]
     help="Folder of a converged run of the same condition to begin with.",
 )
 @click.option("--smoke", is_flag=True, help="Coarse mesh without refinement, for a quick check.")
-@click.option(
-    "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Override a config value."
-)
+@set_option("Override a config value.")
 @click.option("--quiet", is_flag=True, help="Print errors only.")
 @json_option
 def solve_command(
