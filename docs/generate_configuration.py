@@ -50,6 +50,12 @@ STUDIES: Final[tuple[tuple[str, str, type[BaseModel]], ...]] = (
 ALLOWED: Final = {"problem": ", ".join(f"`{name}`" for name in PROBLEMS)}
 """Allowed values of keys that a validator checks."""
 
+NOT_SHIPPED: Final = {
+    "smoke": "not for your own configs: `solve --smoke` writes `true` into the config of its run folder, which marks "
+    "the run as a quick check wherever it is shown; set by hand it marks too, but makes no mesh coarser",
+}
+"""Meaning of keys that no shipped file has."""
+
 _HEAD: Final = """\
 # Configuration
 
@@ -128,7 +134,7 @@ def _table(fields: dict[str, FieldInfo], prefix: str, why: dict[str, str]) -> st
     lines = ["| key | type | allowed | default | what and why |", "| --- | --- | --- | --- | --- |"]
     for field_name, field in fields.items():
         key = f"{prefix}{field.alias or field_name}"
-        lines.append(row(key, field, why.get(key, "not in the shipped file")))
+        lines.append(row(key, field, {**NOT_SHIPPED, **why}[key]))
     return "\n".join([*lines, ""])
 
 
