@@ -257,13 +257,13 @@ def _patient_file(id_or_path: str | Path) -> Path:
     raise PatientError(
         f"no patient '{id_or_path}'",
         allowed=f"{', '.join(shipped_patients())}, a folder with patient.yaml, or a YAML file",
-        mend=did_you_mean(path.name, [*shipped_patients(), *_patients_beside(path)]),
+        mend=did_you_mean(path.stem, [*shipped_patients(), *_patients_beside(path)]),
     )
 
 
 def _patients_beside(path: Path) -> list[str]:
-    """Return the names of files and folders near a path that may hold a patient."""
+    """Return the names of files, without ending, and folders that may hold a patient."""
     if not os.path.isdir(path.parent):
         return []
     folders = [file.parent.name for file in path.parent.glob("*/patient.yaml")]
-    return [*folders, *(file.name for file in path.parent.glob("*.yaml"))]
+    return [*folders, *(file.stem for file in path.parent.glob("*.yaml"))]

@@ -132,7 +132,15 @@ def written(folder: Path, text: str) -> Path:
 
 
 BAD_CONFIGS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
-    "missing file": (lambda f: f / "nowhere.yaml", ("nowhere.yaml: no such file",)),
+    "missing file": (lambda f: f / "nowhere.yaml", ("nowhere.yaml: no such file; check",)),
+    "misspelt file": (
+        lambda f: f / "mapd-ortosis.yaml",
+        ("mapd-ortosis.yaml: no such file; did you mean 'mapd-orthosis'?",),
+    ),
+    "misspelt file of one's own": (
+        lambda f: config_of(f).with_name("stuidy.yaml"),
+        ("stuidy.yaml: no such file; did you mean 'study'?",),
+    ),
     "not YAML": (lambda f: written(f, "a: [1"), ("study.yaml, line", "not valid YAML")),
     "no mapping": (lambda f: written(f, "- 1"), ("holds a list", "keys with values")),
     "unknown key": (
@@ -474,6 +482,15 @@ def test_plain_progress_shows_every_twentieth_and_the_last_iteration() -> None:
     shown = [line.split()[:3] for line in out.getvalue().splitlines()]
     assert shown == [[s, "iteration", n] for s in ("coarse", "fine") for n in ("0", "20", "30")]
     assert len(progress.lines) == 62
+
+
+def test_a_heading_stands_once_before_the_first_iteration() -> None:
+    out = StringIO()
+    with Progress(console=Console(file=out, width=40), heading=("what is worn",)) as progress:
+        assert out.getvalue() == "", "nothing is refused any more once it begins"
+        reports(progress)
+    assert out.getvalue().splitlines()[0] == "what is worn"
+    assert out.getvalue().count("what is worn") == 1
 
 
 def test_live_progress_leaves_one_line_per_stage() -> None:

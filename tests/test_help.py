@@ -28,6 +28,7 @@ from pathwalker_cli.commands.complete import (
 )
 from pathwalker_cli.commands.examples import EXAMPLES
 from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.ocp.ipopt import ProgressReport
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output import run_folder
 from pathwalker_cli.problems import PROBLEMS
@@ -227,9 +228,10 @@ class _Solver:
     end: GaitSolution
 
     def __init__(self, config: Any, observer: Any) -> None:
-        pass
+        self.observer = observer
 
     def solve(self, warm_start: Any = None) -> GaitSolution:
+        self.observer("first mesh", ProgressReport(0, 1.0, 1.0, 1.0))
         return self.end
 
 

@@ -12,11 +12,10 @@ from pydantic import BaseModel
 from pathwalker_cli.checking import recorded, studies
 from pathwalker_cli.checking.prediction import check_prediction
 from pathwalker_cli.checking.report import Changes, Checked
-from pathwalker_cli.config import StudyConfig, find_config
+from pathwalker_cli.config import StudyConfig, config_content, find_config
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.inverse.markers import MarkerSet
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematicsConfig
-from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.patient import OrthosisData, Patient, shipped_patients
 from pathwalker_cli.problems import problem_named
 from pathwalker_cli.studies.batch.schema import BatchStudy
@@ -122,8 +121,7 @@ def _kind_of(path: str) -> str:
     """
     if path in shipped_patients() or (Path(path) / "patient.yaml").is_file():
         return "patient"
-    source = find_config(Path(path))
-    mapping, _ = read_mapping(source, ConfigError)
+    source, mapping, _ = config_content(path)
     return _kind(mapping, source, path)
 
 

@@ -65,17 +65,13 @@ def solve_command(
     """
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.output.orthosis_text import orthosis_rows
     from pathwalker_cli.output.run_folder import default_folder
     from pathwalker_cli.output.solve_text import failure_text
     from pathwalker_cli.studies.run import run_study
 
     study, patient = _study(problem, config, changes, smoke)
     folder = out or default_folder(study, patient.id)
-    if study.condition == "orthosis" and patient.orthosis is not None and not quiet:
-        # Before minutes are spent: a wrong sign of an angle is seen in its direction.
-        click.echo("\n".join(f"{a}: {b}" for a, b in orthosis_rows(patient.orthosis)), err=True)
-    with Progress(quiet) as progress:
+    with Progress(quiet, heading=_worn(study, patient)) as progress:
         outcome = run_study(study, folder, warm_start, progress)
     solution = outcome.solution
     if as_json:
@@ -112,6 +108,15 @@ def _study(
             error.what, where=where, allowed=error.allowed, mend=error.mend
         ) from None
     return smoke_version(study) if smoke else study, patient
+
+
+def _worn(study: StudyConfig, patient: Patient) -> tuple[str, ...]:
+    """Return what is worn, to be read while the solve runs: a wrong sign shows as a direction."""
+    from pathwalker_cli.output.orthosis_text import orthosis_rows
+
+    if study.condition == "barefoot" or patient.orthosis is None:
+        return ()
+    return tuple(f"{label}: {text}" for label, text in orthosis_rows(patient.orthosis))
 
 
 def _content(outcome: Outcome, folder: Path) -> dict[str, Any]:

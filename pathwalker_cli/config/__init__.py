@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathwalker_cli.config.files import (
+    config_content,
     find_config,
     load_config,
     patient_path,
@@ -30,6 +31,7 @@ __all__ = [
     "StartConfig",
     "StudyConfig",
     "apply_change",
+    "config_content",
     "find_config",
     "load_config",
     "patient_path",

@@ -11,13 +11,14 @@ from pydantic import BaseModel
 
 from pathwalker_cli.config.overrides import apply_change
 from pathwalker_cli.config.schema import StudyConfig
-from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.io.yaml_file import KeyPath, read_mapping, validate
+from pathwalker_cli.errors import ConfigError, did_you_mean
+from pathwalker_cli.io.yaml_file import KeyPath, Lines, read_mapping, validate
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.variation import varied
 
 __all__ = [
+    "config_content",
     "find_config",
     "load_config",
     "patient_path",
@@ -68,8 +69,7 @@ def read_config(
     Raises:
         ConfigError: If file or overrides are wrong.
     """
-    source = find_config(Path(path))
-    mapping, lines = read_mapping(source, ConfigError)
+    source, mapping, lines = config_content(path)
     origins = dict(lines)
     for change in changes:
         key = apply(mapping, change)
@@ -77,6 +77,22 @@ def read_config(
             del origins[replaced]
         origins[key] = f"--set {change}"
     return validate(mapping, model, where=str(path), error=ConfigError, lines=origins), source
+
+
+def config_content(path: str | Path) -> tuple[Path, dict[str, Any], Lines]:
+    """Return the file of a config, what it holds, and the line of each of its keys.
+
+    Raises:
+        ConfigError: If it cannot be read.
+    """
+    source = find_config(Path(path))
+    if not os.path.exists(source):
+        near = [file.stem for file in shipped("configs").glob("*.yaml")]
+        if os.path.isdir(source.parent):
+            near += [file.stem for file in source.parent.glob("*.yaml")]
+        if mend := did_you_mean(source.stem, near):
+            raise ConfigError("no such file", where=str(path), mend=mend)
+    return source, *read_mapping(source, ConfigError)
 
 
 def place_of(key: str, source: Path, changes: tuple[str, ...]) -> Path:
