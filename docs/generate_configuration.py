@@ -50,6 +50,12 @@ STUDIES: Final[tuple[tuple[str, str, type[BaseModel]], ...]] = (
 ALLOWED: Final = {"problem": ", ".join(f"`{name}`" for name in PROBLEMS)}
 """Allowed values of keys that a validator checks."""
 
+NOT_SHIPPED: Final = {
+    "smoke": "not for your own configs: `solve --smoke` writes `true` into the config of its run folder, which marks "
+    "the run as a quick check wherever it is shown; set by hand it marks too, but makes no mesh coarser",
+}
+"""Meaning of keys that no shipped file has."""
+
 _HEAD: Final = """\
 # Configuration
 
@@ -62,7 +68,7 @@ A config is a YAML file; unknown keys, numbers outside their range and text in p
 refused with one sentence that names file, line and key. Units are SI and radians and are never
 written beside a number. Paths are relative to the config's folder; those of C3D files and markers
 may also be relative to where the command is run. `--set section.key=value` overrides a key on the
-command line. All predictions (`ls-barefoot`, `mapd-barefoot`, `mapd-ws-orthosis`, `mapd-healthy`) have the keys
+command line; paths in it are relative to where the command is run. All predictions (`ls-barefoot`, `mapd-barefoot`, `mapd-ws-orthosis`, `mapd-healthy`) have the keys
 of `mapd-orthosis.yaml`. Keys of a patient's file are in [patient file](patient-file.md).
 
 *What and why* is the comment that stands beside the key in the shipped file.
@@ -128,7 +134,7 @@ def _table(fields: dict[str, FieldInfo], prefix: str, why: dict[str, str]) -> st
     lines = ["| key | type | allowed | default | what and why |", "| --- | --- | --- | --- | --- |"]
     for field_name, field in fields.items():
         key = f"{prefix}{field.alias or field_name}"
-        lines.append(row(key, field, why.get(key, "not in the shipped file")))
+        lines.append(row(key, field, {**NOT_SHIPPED, **why}[key]))
     return "\n".join([*lines, ""])
 
 

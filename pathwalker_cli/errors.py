@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import difflib
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "NotConvergedError",
     "PathwalkerError",
     "PatientError",
+    "did_you_mean",
     "placed",
 ]
 
@@ -47,6 +49,18 @@ class InputError(PathwalkerError):
 def _one_line(text: str) -> str:
     """Return a text with line ends and control characters, e.g. from a file, as their codes."""
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+def did_you_mean(word: str, known: Iterable[str], otherwise: str = "") -> str:
+    """Return the question after the known word that is nearest to a misspelt one.
+
+    Args:
+        word: What was written.
+        known: What may have been meant.
+        otherwise: What to say if nothing is near.
+    """
+    near = difflib.get_close_matches(word, list(known), n=1, cutoff=0.5)
+    return f"did you mean '{near[0]}'?" if near else otherwise
 
 
 @contextmanager

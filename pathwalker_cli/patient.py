@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from pathwalker_cli.conventions import SIDES, Condition
-from pathwalker_cli.errors import PatientError
+from pathwalker_cli.errors import PatientError, did_you_mean
 from pathwalker_cli.io.fields import Quantity, Sides, YamlModel, invalid
 from pathwalker_cli.io.yaml_file import load_yaml, read_mapping, validate
 from pathwalker_cli.model.proportions import (
@@ -178,6 +178,17 @@ class Patient(YamlModel):
         }
         return Sides[FootPoints](right=points["right"], left=points["left"])
 
+    @property
+    def leg_length(self) -> float:
+        """Mean distance from hip to sole of the straight bare leg [m]."""
+        soles = self.contacts("barefoot")
+        return sum(
+            self.length("thigh", side)
+            + self.length("shank", side)
+            - (soles[side].heel[1] + soles[side].toe[1]) / 2.0
+            for side in SIDES
+        ) / len(SIDES)
+
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """One sentence for everything that was filled in or overridden."""
@@ -246,4 +257,13 @@ def _patient_file(id_or_path: str | Path) -> Path:
     raise PatientError(
         f"no patient '{id_or_path}'",
         allowed=f"{', '.join(shipped_patients())}, a folder with patient.yaml, or a YAML file",
+        mend=did_you_mean(path.stem, [*shipped_patients(), *_patients_beside(path)]),
     )
+
+
+def _patients_beside(path: Path) -> list[str]:
+    """Return the names of files, without ending, and folders that may hold a patient."""
+    if not os.path.isdir(path.parent):
+        return []
+    folders = [file.parent.name for file in path.parent.glob("*/patient.yaml")]
+    return [*folders, *(file.stem for file in path.parent.glob("*.yaml"))]

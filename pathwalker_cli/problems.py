@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 from pathwalker_cli.conventions import Condition
-from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.errors import ConfigError, did_you_mean
 
 __all__ = ["PROBLEMS", "Problem", "problem_named"]
 
@@ -55,5 +55,9 @@ def problem_named(name: str) -> Problem:
         ConfigError: If there is no such problem.
     """
     if name not in PROBLEMS:
-        raise ConfigError(f"there is no problem '{name}'", allowed=", ".join(PROBLEMS))
+        raise ConfigError(
+            f"there is no problem '{name}'",
+            allowed=", ".join(PROBLEMS),
+            mend=did_you_mean(name, PROBLEMS),
+        )
     return PROBLEMS[name]

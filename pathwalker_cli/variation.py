@@ -5,7 +5,6 @@ One way in for everything that asks "what if": cohorts, sensitivities and uncert
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping
 from functools import partial
 from operator import add, mul
@@ -14,7 +13,7 @@ from typing import Annotated, Any, Final
 from pydantic import Field
 
 from pathwalker_cli.conventions import CONDITIONS
-from pathwalker_cli.errors import ConfigError, PatientError
+from pathwalker_cli.errors import ConfigError, PatientError, did_you_mean
 from pathwalker_cli.io.fields import Quantity, YamlModel
 from pathwalker_cli.io.yaml_file import validate
 from pathwalker_cli.patient import Patient
@@ -116,12 +115,11 @@ def _below(holder: Any, part: str, where: str, above: str) -> Any:
     known = [key for key in holder if key not in _IDENTITY] if isinstance(holder, dict) else []
     if part in known:
         return holder[part]
-    near = difflib.get_close_matches(part, known, 1)
     raise ConfigError(
         f"the patient's file has no '{part}'" + (f" in {above}" if above else ""),
         where=where,
         allowed=", ".join(known) or f"nothing below {above}, which is one number",
-        mend=f"did you mean {near[0]}?" if near else "",
+        mend=did_you_mean(part, known),
     )
 
 

@@ -283,7 +283,7 @@ FAULTS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     ),
     "unknown place": (
         lambda f: study_file(f, grid={"variation.scale.strenghts": [0.8]}),
-        ("variation.scale.strenghts", "did you mean strengths?"),
+        ("variation.scale.strenghts", "did you mean 'strengths'?"),
     ),
     "value twice": (
         lambda f: study_file(f, grid={"bounds.friction": [0.7, 0.7]}),

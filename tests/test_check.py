@@ -15,10 +15,12 @@ from click.testing import CliRunner, Result
 from made_c3d import write_c3d
 from pathwalker_cli.checking.expect import FIXED, MEASURED, expected
 from pathwalker_cli.checking.kinds import check_file
+from pathwalker_cli.checking.plausible import odd_patient
 from pathwalker_cli.checking.report import checked_lines
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config, smoke_version
 from pathwalker_cli.io.yaml_file import read_mapping
+from pathwalker_cli.output.orthosis_text import orthosis_rows
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
 
@@ -161,10 +163,107 @@ def test_json_is_one_document(here: Path) -> None:
     assert (second["kind"], second["solves"]) == ("perturbation", 4)
 
 
-def test_json_leaves_stdout_empty_if_a_file_is_refused(here: Path) -> None:
-    result = CliRunner().invoke(cli, ["check", "mapd-orthosis", "nowhere.yaml", "--json"])
-    assert (result.exit_code, result.stdout) == (2, "")
-    assert result.stderr == "Error: nowhere.yaml: no such file; check the path\n"
+def test_json_tells_of_good_files_beside_those_that_are_refused(here: Path) -> None:
+    words = ["check", "nowhere.yaml", "mapd-barefoot", "--json"]
+    result = CliRunner().invoke(cli, words)
+    assert result.exit_code == 2
+    sentence = "nowhere.yaml: no such file; check the path"
+    assert result.stderr == f"Error: {sentence}\n"
+    content = json.loads(result.stdout)
+    assert content["ok"] is False
+    bad, good = content["configs"]
+    assert bad == {"config": "nowhere.yaml", "ok": False, "error": sentence}
+    assert (good["config"], good["ok"], good["intervals"]) == ("mapd-barefoot", True, 52)
+
+
+# Overrides
+
+
+def test_overrides_are_checked_too(here: Path) -> None:
+    words = ("mapd-orthosis", "mapd-barefoot", "--set", "bounds.friction=0.6")
+    result = run(*words)
+    assert result.exit_code == 0, result.output
+    assert result.output.count("bounds.friction: 0.6 (default 0.8)") == 2
+    refused = run("mapd-orthosis", "--set", "bounds.frictoin=0.6")
+    assert refused.exit_code == 2
+    assert "--set bounds.frictoin=0.6: unknown key" in refused.output
+    assert check_file("perturbation", changes=("factors=[0.9]",)).content["solves"] == 4
+    assert check_file("cohort", changes=("grid={}",)).content["solves"] == 2
+    inverse = check_file("inverse-dynamics", changes=("conditions=[barefoot]",))
+    assert list(inverse.content["trials"]) == ["barefoot"]
+
+
+def test_overrides_of_what_is_no_config_are_refused() -> None:
+    result = run(PATIENT, "--set", "body_mass=20")
+    assert result.exit_code == 2
+    assert f"--set body_mass=20: overrides keys of configs, and {PATIENT} is none" in result.output
+
+
+# Orthoses
+
+
+@pytest.fixture
+def child(here: Path) -> Path:
+    """Return the folder of a new child, with an orthosis in a file of its own."""
+    CliRunner().invoke(cli, ["init", "child"])
+    return here / "child"
+
+
+def replaced(path: Path, old: str, new: str) -> Path:
+    """Write something else in a file."""
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("file", ["orthosis.yaml", "patient.yaml", "mapd-orthosis.yaml"])
+def test_an_orthosis_is_told_in_degrees_with_directions(child: Path, file: str) -> None:
+    text = " ".join(run(child / file).output.split())
+    for part in (
+        "neutral angle 1.1 deg dorsiflexion, play 0.6 deg around it, preload 1 N m either way",
+        "stops right and left: 7.4 deg dorsiflexion to 5.7 deg plantarflexion",
+        "springs K_D 5 to 92, K_P 5 to 92 N m/rad",
+        "real springs K_D flexible 40.1, stiff 91.7; K_P softest 5, flexible 40.1 N m/rad",
+    ):
+        assert part in text, part
+    replaced(child / "orthosis.yaml", "neutral_angle: -0.02", "neutral_angle: 0.02")
+    assert "neutral angle 1.1 deg plantarflexion" in " ".join(run(child / file).output.split())
+
+
+def test_stops_that_differ_are_told_per_side() -> None:
+    orthosis = load_patient(PATIENT).require_orthosis()
+    rows = orthosis_rows(orthosis.model_copy(update={"springs": None}))
+    stops = [text.split(":")[0] for label, text in rows if label == "stops"]
+    assert stops == ["right", "left"]
+    assert not [label for label, _ in rows if label == "real springs"], "none are listed"
+
+
+def test_barefoot_nothing_is_told_of_orthoses(child: Path) -> None:
+    assert "neutral angle" not in run(child / "mapd-barefoot.yaml").output
+    assert check_file(str(child / "mapd-barefoot.yaml")).content["orthosis"] is None
+    content = check_file(str(child / "mapd-orthosis.yaml")).content
+    assert content["orthosis"]["neutral_angle"] == -0.02
+
+
+@pytest.mark.parametrize(
+    ("file", "parts"),
+    [
+        ("child/orthosis.yaml", ("is an orthosis file", "the key orthosis of a patient's file")),
+        ("child/patient.yaml", ("is a patient file", "--set patient=FILE")),
+        ("child", ("is a patient file", "the key patient of a config")),
+        ("landscape", ("is a landscape file", "pathwalker landscape")),
+    ],
+)
+def test_another_file_in_place_of_a_config_is_told_where_it_belongs(
+    child: Path, file: str, parts: tuple[str, ...]
+) -> None:
+    for words in (("solve", "mapd-orthosis", file), ("check", file, "--problem", "mapd-orthosis")):
+        result = CliRunner().invoke(cli, list(words))
+        assert result.exit_code == 2
+        assert result.output.startswith(f"Error: {file}: ")
+        for part in parts:
+            assert part in result.output
 
 
 # Expected time
@@ -314,7 +413,7 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     ),
     "an uncertain number that is not there": (
         lambda f: text_of(f, "base: mapd-orthosis\nquantities: {body_mas: {relative: 0.1}}\n"),
-        ("study.yaml", "has no 'body_mas'", "did you mean body_mass?"),
+        ("study.yaml", "has no 'body_mas'", "did you mean 'body_mass'?"),
     ),
     "a landscape upside down": (
         lambda f: text_of(f, "base: mapd-orthosis\nside: left\ndorsiflexion: {from: 100.0}\n"),
@@ -411,6 +510,50 @@ def test_a_problem_that_was_asked_for_must_be_the_configs_own() -> None:
 def test_what_is_unusual_is_a_note(here: Path, blocks: dict[str, Any], part: str) -> None:
     checked = check_file(str(config_of(here, **blocks)))
     assert [note for note in checked.notes if part in note], checked.notes
+
+
+def implausible(child: Path, old: str, new: str, file: str = "patient.yaml") -> str:
+    """Return the remarks on a child of whom something else is written."""
+    return "; ".join(check_file(str(replaced(child / file, old, new))).notes)
+
+
+def test_unusual_sizes_and_springs_are_notes(child: Path) -> None:
+    whole = "; ".join(check_file(str(child)).notes)
+    for word in ("body mass index", "times what", "Froude", "lies outside"):
+        assert word not in whole
+    mass = re.search(r"body_mass: [\d.]+", (child / "patient.yaml").read_text("utf-8"))
+    assert mass is not None
+    found = implausible(child, mass[0], "body_mass: 10.0")
+    assert re.search(r"body_mass 10 kg at height [\d.]+ m is a body mass index of \d\.\d", found)
+    assert "11 to 40 is wider than three standard deviations" in found
+    found = implausible(child, "stiffness: 5.0}", "stiffness: 4.0}", "orthosis.yaml")
+    sentence = "springs.plantarflexion 'softest' of 4 N m/rad lies outside stiffness_range"
+    assert sentence in found
+    inside = "; ".join(check_file(str(child)).notes)
+    assert f"orthosis.{sentence.replace('stiffness_range', 'orthosis.stiffness_range')}" in inside
+
+
+def test_lengths_far_from_proportions_are_notes() -> None:
+    patient = load_patient(PATIENT)
+    assert list(odd_patient(patient)) == []
+    lengths = patient.segment_lengths.model_copy(update={"shank": 0.4})
+    (right, left) = odd_patient(patient.model_copy(update={"segment_lengths": lengths}))
+    assert right.startswith("segment_lengths.shank right 0.4 m is 1.30 times what body proportions")
+    assert "for 1.25 m of height, 0.307 m (Drillis and Contini (1966), adults)" in right
+    assert left.startswith("segment_lengths.shank left")
+
+
+def test_speeds_at_which_people_run_are_notes(here: Path) -> None:
+    leg = load_patient(PATIENT).leg_length
+    limit = (0.5 * 9.81 * leg) ** 0.5
+    for speed, count in ((limit - 0.01, 0), (limit + 0.01, 1)):
+        path = config_of(here, bounds={"least_walking_speed": float(round(speed, 3))})
+        notes = [note for note in check_file(str(path)).notes if "Froude" in note]
+        assert len(notes) == count
+    assert "from the config, is a Froude number v^2/(g leg length) of 0.51" in notes[0]
+    assert "people run" in notes[0]
+    started = check_file(str(config_of(here, start={"walking_speed": 2.5}))).notes
+    assert [note for note in started if note.startswith("start.walking_speed 2.5 m/s is a Froude")]
 
 
 def test_lengths_from_proportions_are_one_note(here: Path) -> None:

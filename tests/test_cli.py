@@ -132,7 +132,15 @@ def written(folder: Path, text: str) -> Path:
 
 
 BAD_CONFIGS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
-    "missing file": (lambda f: f / "nowhere.yaml", ("nowhere.yaml: no such file",)),
+    "missing file": (lambda f: f / "nowhere.yaml", ("nowhere.yaml: no such file; check",)),
+    "misspelt file": (
+        lambda f: f / "mapd-ortosis.yaml",
+        ("mapd-ortosis.yaml: no such file; did you mean 'mapd-orthosis'?",),
+    ),
+    "misspelt file of one's own": (
+        lambda f: config_of(f).with_name("stuidy.yaml"),
+        ("stuidy.yaml: no such file; did you mean 'study'?",),
+    ),
     "not YAML": (lambda f: written(f, "a: [1"), ("study.yaml, line", "not valid YAML")),
     "no mapping": (lambda f: written(f, "- 1"), ("holds a list", "keys with values")),
     "unknown key": (
@@ -169,11 +177,47 @@ BAD_CONFIGS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     ),
     "another problem": (
         lambda f: config_of(f, problem="mapd-barefoot"),
-        ("study.yaml, problem", "is a config for mapd-barefoot, but mapd-orthosis", "use configs/"),
+        (
+            "study.yaml, problem",
+            "is a config for mapd-barefoot, but mapd-orthosis",
+            "use the shipped config mapd-orthosis",
+        ),
     ),
     "unknown problem in the file": (
         lambda f: config_of(f, problem="mapd"),
         ("problem", "is 'mapd'", "mapd-barefoot, mapd-orthosis"),
+    ),
+    "misspelt problem in the file": (
+        lambda f: config_of(f, problem="mapd-ortosis"),
+        ("problem", "did you mean 'mapd-orthosis'?"),
+    ),
+    "misspelt patient": (
+        lambda f: config_of(f, patient="sreenivasa2017-pateint"),
+        ("study.yaml, patient", "did you mean 'sreenivasa2017-patient'?"),
+    ),
+    "speed in words": (
+        lambda f: config_of(f, bounds={"least_walking_speed": "fast"}),
+        ("is 'fast'; allowed: 'recorded' or a number, 0 to 3 m/s",),
+    ),
+    "speed in cm/s": (
+        lambda f: config_of(f, bounds={"least_walking_speed": 80.0}),
+        ("is 80 m/s; allowed: 'recorded' or a number, 0 to 3 m/s; is it in km/h or cm/s?",),
+    ),
+    "one number for a range": (
+        lambda f: config_of(f, bounds={"dorsiflexion_stiffness": 40}),
+        (": bounds.dorsiflexion_stiffness: is 40", "[40, 40] prescribes 40"),
+    ),
+    "one number for the range of a spring": (
+        lambda f: config_of(f, bounds={"stiffness": {"plantarflexion_stiffness_left": 40}}),
+        (": bounds.stiffness.plantarflexion_stiffness_left: is 40", "[40, 40] prescribes 40"),
+    ),
+    "one spring upside down": (
+        lambda f: config_of(f, bounds={"stiffness": {"dorsiflexion_stiffness_left": [9, 5]}}),
+        (": bounds.stiffness.dorsiflexion_stiffness_left: is [9, 5], upside down",),
+    ),
+    "one joint upside down": (
+        lambda f: config_of(f, bounds={"joint_ranges": {"knee_r": [1.0, 0.5]}}),
+        (": bounds.joint_ranges.knee_r: is [1, 0.5], upside down",),
     ),
     "unknown patient": (
         lambda f: config_of(f, patient="nobody"),
@@ -212,9 +256,31 @@ def refused(folder: Path, result: Result, parts: tuple[str, ...]) -> None:
         ),
         (["mapd-barefoot", "mapd-orthosis"], ("is a config for mapd-orthosis",)),
         (["mapd-orthosis", "mapd-orthosis", "--set", "nonsense"], ("--set", "dotted.key=value")),
-        (["mapd-orthosis", "mapd-orthosis", "--set", "mesh.degre=3"], ("degre", "degree")),
-        (["mapd-orthosis", "mapd-orthosis", "--set", "mesh.degree=two"], ("mesh.degree", "two")),
-        (["mapd-orthosis", "mapd-orthosis", "--set", "bounds.friction=-1"], ("0.05 to 2",)),
+        (["mapd-ortosis", "mapd-orthosis"], ("did you mean 'mapd-orthosis'?",)),
+        (
+            ["mapd-orthosis", "mapd-orthosis", "--set", "mesh.degre=3"],
+            ("Error: --set mesh.degre=3: unknown key", "did you mean 'degree'?"),
+        ),
+        (
+            ["mapd-orthosis", "mapd-orthosis", "--set", "mesh.degree=two"],
+            ("Error: --set mesh.degree=two: is 'two'",),
+        ),
+        (
+            ["mapd-orthosis", "mapd-orthosis", "--set", "bounds.friction=-1"],
+            ("Error: --set bounds.friction=-1: is -1; allowed: 0.05 to 2",),
+        ),
+        (
+            ["mapd-orthosis", "mapd-orthosis", "--set", "bounds.stiffness={K_D: [1, 2]}"],
+            ("Error: --set bounds.stiffness={K_D: [1, 2]}: names 'K_D'",),
+        ),
+        (
+            ["mapd-orthosis", "mapd-orthosis", "--set", "bounds={friction: 9}"],
+            ("Error: --set bounds={friction: 9}: bounds.friction: is 9",),
+        ),
+        (
+            ["mapd-orthosis", "mapd-orthosis", "--set", "bounds.friction=[1"],
+            ("Error: --set bounds.friction=[1: '[1' is not a YAML value",),
+        ),
         (["mapd-orthosis", "mapd-orthosis", "--set", "problem.x=1"], ("holds no keys",)),
         (["mapd-orthosis", "mapd-orthosis", "--warm-start", "old"], ("old: no such folder",)),
         (["mapd-orthosis", "mapd-orthosis", "--warm-start", "."], ("is no run folder",)),
@@ -416,6 +482,15 @@ def test_plain_progress_shows_every_twentieth_and_the_last_iteration() -> None:
     shown = [line.split()[:3] for line in out.getvalue().splitlines()]
     assert shown == [[s, "iteration", n] for s in ("coarse", "fine") for n in ("0", "20", "30")]
     assert len(progress.lines) == 62
+
+
+def test_a_heading_stands_once_before_the_first_iteration() -> None:
+    out = StringIO()
+    with Progress(console=Console(file=out, width=40), heading=("what is worn",)) as progress:
+        assert out.getvalue() == "", "nothing is refused any more once it begins"
+        reports(progress)
+    assert out.getvalue().splitlines()[0] == "what is worn"
+    assert out.getvalue().count("what is worn") == 1
 
 
 def test_live_progress_leaves_one_line_per_stage() -> None:

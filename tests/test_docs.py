@@ -18,11 +18,14 @@ from pathwalker_cli import __version__, load_patient
 from pathwalker_cli.cli import COMMANDS
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS
+from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.goals import GOALS
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.yaml_file import read_mapping, validate
 from pathwalker_cli.model.contact import PHASES
+from pathwalker_cli.output.orthosis_text import angle_words
 from pathwalker_cli.output.run_metrics import RunInputs, run_metrics
+from pathwalker_cli.patient import OrthosisData
 from pathwalker_cli.problems import PROBLEMS
 
 ROOT = Path(__file__).parent.parent
@@ -91,6 +94,15 @@ def test_every_shipped_config_key_is_in_the_reference(name: str) -> None:
         above = [".".join(parts[: i + 1]) for i in range(len(parts))]
         table = any(f"| `{place}` |" in reference for place in above)
         assert table or f"### {key}\n" in reference, key
+
+
+def test_every_key_of_the_reference_has_a_meaning() -> None:
+    generator = script("generate_configuration.py")
+    assert set(generator.NOT_SHIPPED) == {"smoke"}, "all others stand in the shipped files"
+    (row,) = re.findall(r"^\| `smoke` .*$", text_of("docs/configuration.md"), re.MULTILINE)
+    assert "`solve --smoke` writes" in row
+    config = load_config("mapd-barefoot", changes=("smoke=true",))
+    assert config.mesh == load_config("mapd-barefoot").mesh, "by hand it only marks"
 
 
 def test_every_command_is_in_the_reference() -> None:
@@ -271,6 +283,13 @@ def test_own_patient_and_orthosis_are_accepted(tmp_path: Path) -> None:
         config = load_config(path, problem)
         assert load_patient(config.patient).id == "anna"
     assert len(config.bounds.stiffness) == 4
+    page = text_of("docs/own-orthosis.md")
+    orthosis = load_patient(config.patient).require_orthosis()
+    assert f"`neutral angle {angle_words(orthosis.neutral_angle)}`" in page
+    guessed = yaml.safe_load(hinge) | {"free_play": 0.01, "preload_torque": 0.0}
+    assert validate(guessed, OrthosisData).preload_torque == 0.0
+    with pytest.raises(ConfigError, match="free_play"):
+        validate(guessed | {"free_play": 0.0}, OrthosisData)
     assert validate(yaml.safe_load(torques), InverseDynamicsConfig).patient == "anna/"
 
 

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from pathwalker_cli.config import BoundsConfig, StudyConfig, load_config
+from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.io.recordings import read_recording
 from pathwalker_cli.model.contact import PHASES
+from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.blocks import Block
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -22,6 +24,7 @@ from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.series import actuator_torques
 from pathwalker_cli.ocp.solve import GaitSolver, solve_study
 from pathwalker_cli.ocp.start import recorded_stride
+from pathwalker_cli.patient import load_patient
 
 CHILD = str(Path(__file__).parent / "data" / "child-10y" / "patient.yaml")
 
@@ -130,6 +133,16 @@ def test_recorded_stride_is_closed_and_begins_at_left_toe_off(solver: GaitSolver
     assert 0.4 < values[-1, 0] < 0.9
     left = [solver.walker.contact_points(q)[2:, 1].min() for q in values]
     assert np.mean(left[5:20]) > 0.01  # the left foot swings first
+
+
+def test_the_fallback_speed_is_the_same_with_and_without_orthoses() -> None:
+    patient = load_patient(CHILD)
+    bare, shod = (build_walker(patient, condition) for condition in CONDITIONS)
+    assert patient.leg_length == pytest.approx(bare.leg_length, abs=1e-9)
+    assert shod.leg_length > bare.leg_length + 0.01, "the shoe lengthens the leg"
+    least = [gait_bounds(w, BoundsConfig()).table.entries[("walking_speed",)] for w in (bare, shod)]
+    assert least[0] == least[1]
+    assert least[0][0] == pytest.approx(0.25 * np.sqrt(9.81 * bare.leg_length))
 
 
 def test_bounds_come_from_barefoot_recordings_config_or_fallback(solver: GaitSolver) -> None:

@@ -16,16 +16,19 @@ import pytest
 from click.testing import CliRunner, Result
 
 from conftest import MadeSolution
+from pathwalker_cli.checking.kinds import KINDS
 from pathwalker_cli.cli import COMMANDS, GROUPS, cli
-from pathwalker_cli.commands import neighbour_study
+from pathwalker_cli.commands import complete, neighbour_study
 from pathwalker_cli.commands.complete import (
     complete_configs,
+    complete_keys,
     complete_patients,
     complete_problems,
     complete_runs,
 )
 from pathwalker_cli.commands.examples import EXAMPLES
 from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.ocp.ipopt import ProgressReport
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output import run_folder
 from pathwalker_cli.problems import PROBLEMS
@@ -108,10 +111,10 @@ def test_the_bash_script_is_bash() -> None:
     assert subprocess.run(["bash", "-n"], input=script, text=True, check=False).returncode == 0
 
 
-def offered(complete: Callable[..., Any], begun: str) -> list[str]:
+def offered(completer: Callable[..., Any], begun: str, name: str = "") -> list[str]:
     """Return what is offered for a word that was begun."""
-    context = click.Context(cli)
-    return [item.value for item in complete(context, click.Argument(["x"]), begun)]
+    context = click.Context(cli, info_name=name)
+    return [item.value for item in completer(context, click.Argument(["x"]), begun)]
 
 
 def test_problems_configs_and_patients_complete(here: Path) -> None:
@@ -136,9 +139,67 @@ def test_problems_configs_and_patients_complete(here: Path) -> None:
 def test_runs_complete_to_their_folder(here: Path) -> None:
     (here / "runs" / "barefoot").mkdir(parents=True)
     (here / "runs" / "barefoot" / "metrics.json").touch()
-    (here / "runs" / "other").mkdir()
+    (here / "runs" / "other" / "figures").mkdir(parents=True)
+    (here / "runs" / "study" / "base").mkdir(parents=True)
+    (here / "runs" / "study" / "base" / "metrics.json").touch()
+    (here / "docs").mkdir()
     assert offered(complete_runs, "") == ["runs/"]
-    assert offered(complete_runs, "runs/") == ["runs/barefoot", "runs/other/"]
+    assert offered(complete_runs, "runs/") == ["runs/barefoot", "runs/study/"]
+    assert offered(complete_runs, "runs/study/") == ["runs/study/base"]
+
+
+def test_a_report_is_offered_all_that_it_takes(here: Path) -> None:
+    for folder, mark in (("walk", "metrics.json"), ("torques", "stances.csv"), ("notes", "a.txt")):
+        (here / "runs" / folder).mkdir(parents=True)
+        (here / "runs" / folder / mark).touch()
+    assert offered(complete_runs, "runs/", "report") == ["runs/torques", "runs/walk"]
+    assert offered(complete_runs, "runs/", "compare") == ["runs/walk"]
+
+
+def test_a_deep_or_wide_folder_is_not_searched_to_its_end(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deep = here / "runs" / "a" / "b" / "c" / "d"
+    deep.mkdir(parents=True)
+    (deep / "metrics.json").touch()
+    assert offered(complete_runs, "") == []
+    assert offered(complete_runs, "runs/") == ["runs/a/"]
+    monkeypatch.setattr(complete, "_MOST_FOLDERS", 1)
+    assert offered(complete_runs, "") == ["runs/"], "who does not know lets go on"
+
+
+def test_keys_of_predictions_complete() -> None:
+    every = offered(complete_keys, "", "solve")
+    assert {"problem", "starts", "mesh.degree", "bounds.least_walking_speed"} <= set(every)
+    assert "mesh" not in every
+    assert offered(complete_keys, "bounds.fr", "solve") == ["bounds.friction"]
+    assert offered(complete_keys, "bounds.fr", "check") == ["bounds.friction"]
+    assert offered(complete_keys, "bounds.friction=", "solve") == []
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_keys_of_every_command_with_overrides_complete(name: str) -> None:
+    option = next((p for p in command(name).params if "--set" in p.opts), None)
+    if option is None:
+        return
+    offers = option.shell_complete(click.Context(cli, info_name=name), "")
+    model = KINDS[complete._SHIPPED.get(name, "prediction")].model
+    keys = {field.alias or key for key, field in model.model_fields.items()}
+    assert {item.value.partition(".")[0] for item in offers} == keys
+
+
+def test_completing_keys_imports_no_heavy_library() -> None:
+    ask = "; ".join(
+        f"complete_keys(Context(Command('{name}'), info_name='{name}'), None, '')"
+        for name in ("solve", "id", "landscape", "batch")
+    )
+    code = (
+        "import sys; from click import Command, Context; "
+        f"from pathwalker_cli.commands.complete import complete_keys; {ask}; "
+        "print([m for m in ('casadi', 'pinocchio', 'scipy', 'matplotlib') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
 
 
 def test_the_shell_gets_what_it_asks_for(tmp_path: Path) -> None:
@@ -167,9 +228,10 @@ class _Solver:
     end: GaitSolution
 
     def __init__(self, config: Any, observer: Any) -> None:
-        pass
+        self.observer = observer
 
     def solve(self, warm_start: Any = None) -> GaitSolution:
+        self.observer("first mesh", ProgressReport(0, 1.0, 1.0, 1.0))
         return self.end
 
 
@@ -197,6 +259,14 @@ def test_a_solve_prints_one_document(solve: Callable[..., Result], here: Path) -
         "mine", "converged", True,
     )  # fmt: skip
     assert content["metrics"] == json.loads((here / "mine" / "metrics.json").read_text("utf-8"))
+
+
+def test_a_solve_begins_with_what_is_worn(solve: Callable[..., Result]) -> None:
+    lines = solve("--out", "mine").stderr.splitlines()
+    assert lines[0].startswith("orthosis: per leg ")
+    assert "neutral angle" in lines[0]
+    assert lines[1].startswith("stops: right: ")
+    assert "neutral angle" not in solve("--out", "mine", "--quiet").stderr
 
 
 def test_a_solve_that_failed_prints_one_document_too(solve: Callable[..., Result]) -> None:

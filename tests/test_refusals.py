@@ -79,7 +79,7 @@ FAULTS: dict[str, tuple[Callable[[Path], object], Words, tuple[str, ...]]] = {
     "unknown key": (
         write_c3d,
         kinematics(f"c3d.barefoot=[{C3D}]", "longest_gaps=0.2"),
-        ("longest_gaps: unknown key", "did you mean 'longest_gap'?"),
+        ("--set longest_gaps=0.2: unknown key", "did you mean 'longest_gap'?"),
     ),
     "marker set of another lab": (
         renamed_marker,
@@ -94,7 +94,7 @@ FAULTS: dict[str, tuple[Callable[[Path], object], Words, tuple[str, ...]]] = {
     "cut-off below zero": (
         lambda path: None,
         dynamics("motion_cutoff=-6"),
-        ("motion_cutoff: is -6 Hz; allowed: 1 to 50 Hz",),
+        ("--set motion_cutoff=-6: is -6 Hz; allowed: 1 to 50 Hz",),
     ),
     "cut-off above half the frame rate": (
         lambda path: write_c3d(path, plate=True, rate=60.0),

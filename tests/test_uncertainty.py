@@ -97,7 +97,7 @@ def test_lengths_left_to_proportions_can_be_drawn() -> None:
 @pytest.mark.parametrize(
     ("quantities", "words"),
     [
-        ({"strenghts": {"relative": 0.1}}, "did you mean strengths?"),
+        ({"strenghts": {"relative": 0.1}}, "did you mean 'strengths'?"),
         ({"strengths.hip": {"relative": 0.1}}, "quantities.strengths.hip"),
         ({"id": {"relative": 0.1}}, "has no 'id'"),
         (
@@ -276,7 +276,7 @@ def test_a_killed_study_goes_on_where_it_was(
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("quantities={strenghts: {relative: 0.1}}",), "did you mean strengths?"),
+        (("quantities={strenghts: {relative: 0.1}}",), "did you mean 'strengths'?"),
         (("quantities={}",), "quantities"),
         (("quantities={strengths: {relative: 0.1, absolute: 1.0}}",), "one of the two"),
         (("quantities={strengths: {each: true}}",), "neither relative nor absolute"),

@@ -56,7 +56,7 @@ def test_the_model_follows_and_the_notes_say_so() -> None:
 @pytest.mark.parametrize(
     ("variation", "error", "words"),
     [
-        ({"scale": {"strenghts": 0.5}}, ConfigError, "did you mean strengths?"),
+        ({"scale": {"strenghts": 0.5}}, ConfigError, "did you mean 'strengths'?"),
         ({"scale": {"body_mass.x": 0.5}}, ConfigError, "which is one number"),
         ({"scale": {"sex": 0.5}}, ConfigError, "has no 'sex'"),
         ({"shift": {"orthosis.neutral_angle": 1.0}}, PatientError, "neutral_angle"),

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from pydantic import BaseModel
 
 from pathwalker_cli.checking import recorded, studies
 from pathwalker_cli.checking.prediction import check_prediction
-from pathwalker_cli.checking.report import Checked
-from pathwalker_cli.config import StudyConfig, find_config
+from pathwalker_cli.checking.report import Changes, Checked
+from pathwalker_cli.config import StudyConfig, config_content, find_config
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.inverse.markers import MarkerSet
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematicsConfig
-from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.patient import OrthosisData, Patient, shipped_patients
 from pathwalker_cli.problems import problem_named
 from pathwalker_cli.studies.batch.schema import BatchStudy
@@ -25,46 +25,104 @@ from pathwalker_cli.studies.sensitivity.study import SensitivityStudy
 from pathwalker_cli.studies.tradeoff.study import TradeoffStudy
 from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy
 
-__all__ = ["KINDS", "check_file"]
+__all__ = ["KINDS", "Kind", "check_file", "meant_as_prediction"]
 
-Check = Callable[[str], Checked]
+Check = Callable[[str, Changes], Checked]
 
-KINDS: Final[dict[str, tuple[type[BaseModel], Check]]] = {
-    "prediction": (StudyConfig, check_prediction),
-    "perturbation": (PerturbationStudy, studies.check_perturbation),
-    "sensitivity": (SensitivityStudy, studies.check_sensitivity),
-    "uncertainty": (UncertaintyStudy, studies.check_uncertainty),
-    "landscape": (LandscapeStudy, studies.check_landscape),
-    "tradeoff": (TradeoffStudy, studies.check_tradeoff),
-    "cohort": (BatchStudy, studies.check_batch),
-    "inverse-kinematics": (InverseKinematicsConfig, recorded.check_kinematics),
-    "inverse-dynamics": (InverseDynamicsConfig, recorded.check_dynamics),
-    "markers": (MarkerSet, recorded.check_markers),
-    "patient": (Patient, recorded.check_patient_file),
-    "orthosis": (OrthosisData, recorded.check_orthosis),
+
+class Kind(NamedTuple):
+    """What a kind of file is read as, who checks it, and what takes it.
+
+    Args:
+        model: Model of its content.
+        check: Says what would be done with it.
+        taken_by: The command or key that it is for.
+    """
+
+    model: type[BaseModel]
+    check: Check
+    taken_by: str
+
+
+KINDS: Final[dict[str, Kind]] = {
+    "prediction": Kind(StudyConfig, check_prediction, "pathwalker solve PROBLEM"),
+    "perturbation": Kind(PerturbationStudy, studies.check_perturbation, "pathwalker perturb"),
+    "sensitivity": Kind(SensitivityStudy, studies.check_sensitivity, "pathwalker sensitivity"),
+    "uncertainty": Kind(UncertaintyStudy, studies.check_uncertainty, "pathwalker uncertainty"),
+    "landscape": Kind(LandscapeStudy, studies.check_landscape, "pathwalker landscape"),
+    "tradeoff": Kind(TradeoffStudy, studies.check_tradeoff, "pathwalker tradeoff"),
+    "cohort": Kind(BatchStudy, studies.check_batch, "pathwalker batch"),
+    "inverse-kinematics": Kind(InverseKinematicsConfig, recorded.check_kinematics, "pathwalker ik"),
+    "inverse-dynamics": Kind(InverseDynamicsConfig, recorded.check_dynamics, "pathwalker id"),
+    "markers": Kind(
+        MarkerSet,
+        recorded.check_markers,
+        "--markers of pathwalker import, and the key markers of configs of ik and id",
+    ),
+    "patient": Kind(
+        Patient, recorded.check_patient_file, "the key patient of a config, or --set patient=FILE"
+    ),
+    "orthosis": Kind(OrthosisData, recorded.check_orthosis, "the key orthosis of a patient's file"),
 }
-"""Name, model and check of every kind of file."""
+"""Every kind of file by its name."""
 
 
-def check_file(path: str, problem: str = "") -> Checked:
+def check_file(path: str, problem: str = "", changes: Changes = ()) -> Checked:
     """Return what would be done with a file, after all checks that need no solve.
 
     Args:
         path: A file, the name of a shipped config, or a patient: id or folder.
         problem: Problem that it must be of.
+        changes: Overrides "dotted.key=value" of a config.
 
     Raises:
         InputError: The first thing that is wrong.
     """
     if problem:
         problem_named(problem)
-        return check_prediction(path, problem)
+        with meant_as_prediction(path):
+            return check_prediction(path, changes, problem)
+    kind = _kind_of(path)
+    # A shipped marker set is read where it lies: it has no loader that knows names.
+    file = str(find_config(Path(path))) if kind == "markers" else path
+    return KINDS[kind].check(file, changes)
+
+
+@contextmanager
+def meant_as_prediction(path: str) -> Iterator[None]:
+    """Say of a config that is refused, if so, that it is a file of another kind, and whose.
+
+    Args:
+        path: The config, a file or the name of a shipped one.
+    """
+    try:
+        yield
+    except ConfigError:
+        try:
+            kind = _kind_of(path)
+        except ConfigError:
+            kind = "prediction"
+        if kind == "prediction":
+            raise
+        a = "an" if kind[0] in "aeiou" else "a"
+        raise ConfigError(
+            f"is {a} {kind} file, not the config of a prediction",
+            where=path,
+            allowed="a config with the key problem",
+            mend=f"this file is for {KINDS[kind].taken_by}",
+        ) from None
+
+
+def _kind_of(path: str) -> str:
+    """Return what a file, a shipped config or a patient is.
+
+    Raises:
+        ConfigError: If it cannot be read or told.
+    """
     if path in shipped_patients() or (Path(path) / "patient.yaml").is_file():
-        return recorded.check_patient_file(path)
-    source = find_config(Path(path))
-    mapping, _ = read_mapping(source, ConfigError)
-    _, check = KINDS[_kind(mapping, source, path)]
-    return check(str(source) if check is recorded.check_markers else path)
+        return "patient"
+    source, mapping, _ = config_content(path)
+    return _kind(mapping, source, path)
 
 
 def _kind(mapping: Mapping[str, Any], source: Path, where: str) -> str:
@@ -77,7 +135,7 @@ def _kind(mapping: Mapping[str, Any], source: Path, where: str) -> str:
         return "prediction"
     if mapping.get("study") in KINDS:
         return str(mapping["study"])
-    known = {name: len(mapping.keys() & _keys(model)) for name, (model, _) in KINDS.items()}
+    known = {name: len(mapping.keys() & _keys(model)) for name, (model, _, _) in KINDS.items()}
     most = max(known.values())
     found = [name for name, count in known.items() if count == most]
     named = [name for name in found if name in source.stem]

@@ -7,16 +7,19 @@ from pathlib import Path
 from typing import Any
 
 from pathwalker_cli.checking.expect import expected
-from pathwalker_cli.checking.report import Checked, Row
+from pathwalker_cli.checking.plausible import odd_patient
+from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.checking.sense import contradictions, oddities
 from pathwalker_cli.config import StudyConfig, load_config, study_patient
 from pathwalker_cli.conventions import CONDITIONS, STIFFNESSES
 from pathwalker_cli.errors import DataError, PatientError, placed
 from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.model.healthy import healthy_strength
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.solve import GaitSolver
+from pathwalker_cli.output.orthosis_text import orthosis_rows
 from pathwalker_cli.output.run_folder import ENTRIES, check_target, default_folder
 from pathwalker_cli.output.solve_text import patient_notes
 from pathwalker_cli.patient import Patient
@@ -26,23 +29,27 @@ from pathwalker_cli.studies.batch.checks import check_patient
 __all__ = [
     "check_prediction",
     "described",
+    "orthosis_content",
     "patient_content",
+    "patient_remarks",
     "patient_rows",
     "ready_solver",
+    "walker_rows",
 ]
 
 
-def check_prediction(path: str, problem: str = "") -> Checked:
+def check_prediction(path: str, changes: Changes = (), problem: str = "") -> Checked:
     """Return what a solve of a config would do.
 
     Args:
         path: The config, a file or the name of a shipped one.
+        changes: Overrides "dotted.key=value".
         problem: Problem that it must be of.
 
     Raises:
         InputError: The first thing that is wrong.
     """
-    config = load_config(path, problem)
+    config = load_config(path, problem, changes)
     solver = ready_solver(config, path)
     return described(solver, path)
 
@@ -109,7 +116,7 @@ def described(solver: GaitSolver, path: str) -> Checked:
     bounds = _bounds(solver)
     table: list[Row] = [
         ("problem", f"{config.problem}, {walker.condition}"),
-        *patient_rows(patient),
+        *walker_rows(walker),
         ("phases", f"{len(names)}: {', '.join(names)}" + "; then their mirror image" * mirrored),
         ("start", solver.stride.name + (f", {config.starts} starts" * (config.starts > 1))),
         (
@@ -128,6 +135,7 @@ def described(solver: GaitSolver, path: str) -> Checked:
         "problem": config.problem,
         "condition": walker.condition,
         "patient": patient_content(patient),
+        "orthosis": orthosis_content(patient) if walker.orthosis is not None else None,
         "phases": names,
         "start": solver.stride.name,
         "starts": config.starts,
@@ -147,8 +155,26 @@ def described(solver: GaitSolver, path: str) -> Checked:
             "most": round(seconds.most, 1),
         },
     }
-    notes = (*oddities(solver), *patient_notes(patient))
+    notes = (*oddities(solver), *patient_remarks(patient))
     return Checked(path, "prediction", tuple(table), content, notes)
+
+
+def walker_rows(walker: Walker) -> list[Row]:
+    """Return who walks, and what is worn."""
+    rows = patient_rows(walker.patient)
+    if walker.orthosis is not None:
+        rows += orthosis_rows(walker.patient.require_orthosis())
+    return rows
+
+
+def patient_remarks(patient: Patient) -> tuple[str, ...]:
+    """Return what is unusual about a patient, then what was filled in."""
+    return (*odd_patient(patient), *patient_notes(patient))
+
+
+def orthosis_content(patient: Patient) -> dict[str, Any] | None:
+    """Return what is worn as plain values, in the units of the file."""
+    return patient.orthosis.model_dump(mode="json") if patient.orthosis is not None else None
 
 
 def patient_rows(patient: Patient) -> list[Row]:

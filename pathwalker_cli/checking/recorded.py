@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from pathwalker_cli.checking.prediction import patient_content, patient_rows
-from pathwalker_cli.checking.report import Checked, Row
+from pathwalker_cli.checking.plausible import odd_orthosis
+from pathwalker_cli.checking.prediction import (
+    orthosis_content,
+    patient_content,
+    patient_remarks,
+    patient_rows,
+)
+from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import ConfigError, placed
 from pathwalker_cli.inverse.evaluate import require_trials
@@ -20,7 +26,7 @@ from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.yaml_file import load_yaml
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.output.solve_text import patient_notes
+from pathwalker_cli.output.orthosis_text import orthosis_rows
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient
 
 __all__ = [
@@ -32,18 +38,18 @@ __all__ = [
 ]
 
 
-def check_kinematics(path: str) -> Checked:
+def check_kinematics(path: str, changes: Changes = ()) -> Checked:
     """Return what `ik` would do."""
-    config = load_inverse_kinematics(path)
+    config = load_inverse_kinematics(path, changes)
     with placed(path):
         patient = load_patient(config.patient)
         found = _c3d(config, patient)
     return _recorded(path, "inverse kinematics", patient, found, "C3D files")
 
 
-def check_dynamics(path: str) -> Checked:
+def check_dynamics(path: str, changes: Changes = ()) -> Checked:
     """Return what `id` would do."""
-    config: InverseDynamicsConfig = load_inverse_dynamics(path)
+    config: InverseDynamicsConfig = load_inverse_dynamics(path, changes)
     with placed(path):
         patient = load_patient(config.patient)
         require_trials(config, patient)
@@ -57,8 +63,9 @@ def check_dynamics(path: str) -> Checked:
     return _recorded(path, "inverse dynamics", patient, found, "recordings beside the patient")
 
 
-def check_markers(path: str) -> Checked:
+def check_markers(path: str, changes: Changes = ()) -> Checked:
     """Return what a marker set holds."""
+    _require_none(changes, path)
     found: MarkerSet = load_marker_set(path)
     with placed(path):
         patient = load_patient("sreenivasa2017-patient")
@@ -72,8 +79,9 @@ def check_markers(path: str) -> Checked:
     return Checked(path, "marker set", tuple(rows), {"markers": names})
 
 
-def check_patient_file(path: str) -> Checked:
+def check_patient_file(path: str, changes: Changes = ()) -> Checked:
     """Return who a patient is; the models of both conditions are built."""
+    _require_none(changes, path)
     patient = load_patient(path)
     with placed(path):
         if patient.strengths is not None:
@@ -83,30 +91,33 @@ def check_patient_file(path: str) -> Checked:
     recordings = {c: recording_names(patient, c) for c in CONDITIONS}
     rows = [
         *patient_rows(patient),
-        ("orthosis", _orthosis(patient.orthosis) if patient.orthosis else "none"),
+        *(orthosis_rows(patient.orthosis) if patient.orthosis else [("orthosis", "none")]),
         ("recorded", ", ".join(patient.recorded) or "nothing"),
         ("recordings", ", ".join(f"{len(n)} {c}" for c, n in recordings.items() if n) or "none"),
     ]
-    content = {"patient": patient_content(patient), "orthosis": patient.orthosis is not None}
+    content = {"patient": patient_content(patient), "orthosis": orthosis_content(patient)}
     missing = ["strengths are not given: nothing can be predicted yet"] * (
         patient.strengths is None
     )
-    return Checked(path, "patient", tuple(rows), content, (*missing, *patient_notes(patient)))
+    return Checked(path, "patient", tuple(rows), content, (*missing, *patient_remarks(patient)))
 
 
-def check_orthosis(path: str) -> Checked:
+def check_orthosis(path: str, changes: Changes = ()) -> Checked:
     """Return what an orthosis is."""
+    _require_none(changes, path)
     found = load_yaml(path, OrthosisData, ConfigError)
-    return Checked(path, "orthosis", (("orthosis", _orthosis(found)),), {})
+    content = {"orthosis": found.model_dump(mode="json")}
+    return Checked(path, "orthosis", tuple(orthosis_rows(found)), content, (*odd_orthosis(found),))
 
 
-def _orthosis(found: OrthosisData) -> str:
-    real = found.stiffness_range
-    return (
-        f"{found.mass.shank + found.mass.foot:g} kg per leg, K_D {real.dorsiflexion[0]:g} to "
-        f"{real.dorsiflexion[1]:g}, K_P {real.plantarflexion[0]:g} to {real.plantarflexion[1]:g} "
-        f"N m/rad ({real.source})"
-    )
+def _require_none(changes: Changes, path: str) -> None:
+    """Refuse overrides of what is no config."""
+    if changes:
+        raise ConfigError(
+            f"overrides keys of configs, and {path} is none",
+            where=f"--set {changes[0]}",
+            mend="check that file in a call of its own",
+        )
 
 
 def _c3d(config: RecordedConfig, patient: Patient) -> dict[str, list[str]]:
@@ -129,4 +140,4 @@ def _recorded(
     rows = [*patient_rows(patient)]
     rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in found.items() if n]
     content: dict[str, Any] = {"patient": patient_content(patient), "trials": found}
-    return Checked(path, kind, tuple(rows), content, patient_notes(patient))
+    return Checked(path, kind, tuple(rows), content, patient_remarks(patient))

@@ -7,12 +7,14 @@ from dataclasses import dataclass, field
 from textwrap import wrap
 from typing import Any, Final
 
-__all__ = ["Checked", "checked_lines"]
+__all__ = ["Changes", "Checked", "Row", "checked_lines"]
 
 _WIDTH: Final = 80
 _COLUMN: Final = 20
 
 Row = tuple[str, str]
+Changes = tuple[str, ...]
+"""Overrides "dotted.key=value", as from the command line."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pathwalker_cli.checking.plausible import odd_speed
 from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.ocp.solve import GaitSolver
@@ -30,6 +31,7 @@ def contradictions(solver: GaitSolver) -> Iterator[ConfigError]:
 
 def oddities(solver: GaitSolver) -> Iterator[str]:
     """Yield sentences about what is allowed and probably not meant."""
+    yield from _odd_speeds(solver)
     yield from _partly_real_springs(solver)
     yield from _start_springs(solver)
     yield from _start_angles(solver)
@@ -175,6 +177,16 @@ def _start_angles(solver: GaitSolver) -> Iterator[str]:
                 f"{angles.max():.2f} rad, all outside its range [{low:.2f}, {high:.2f}]: it "
                 "may not converge from there; try another start.knee_flexion or a recorded start"
             )
+
+
+def _odd_speeds(solver: GaitSolver) -> Iterator[str]:
+    patient = solver.walker.patient
+    least = solver.bounds.table.entries[("walking_speed",)][0]
+    if not solver.config.fits:
+        reason = solver.bounds.sources["walking_speed"]
+        yield from odd_speed(patient, least, f"the bound on walking speed, {reason},")
+    if (begun := solver.config.start.walking_speed) is not None:
+        yield from odd_speed(patient, begun, f"start.walking_speed {begun:g} m/s")
 
 
 def _comfort(solver: GaitSolver) -> Iterator[str]:

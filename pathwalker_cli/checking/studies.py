@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.checking.prediction import described, patient_rows, ready_solver
-from pathwalker_cli.checking.report import Checked, Row
+from pathwalker_cli.checking.prediction import described, ready_solver, walker_rows
+from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError, placed
@@ -33,9 +33,9 @@ __all__ = [
 ]
 
 
-def check_perturbation(path: str) -> Checked:
+def check_perturbation(path: str, changes: Changes = ()) -> Checked:
     """Return what `perturb` would do."""
-    study = load_study(path, PerturbationStudy)
+    study = load_study(path, PerturbationStudy, changes)
     solver = _base(study, path, springs=True)
     with placed(path):
         springs = moved_springs(study, free_springs(_ranges(solver)))
@@ -45,9 +45,9 @@ def check_perturbation(path: str) -> Checked:
     return _study(path, "perturbation", solver, solves, what)
 
 
-def check_sensitivity(path: str) -> Checked:
+def check_sensitivity(path: str, changes: Changes = ()) -> Checked:
     """Return what `sensitivity` would do."""
-    study = load_study(path, SensitivityStudy)
+    study = load_study(path, SensitivityStudy, changes)
     solver = _base(study, path)
     patient, worn = solver.walker.patient, solver.walker.orthosis is not None
     with placed(path):
@@ -70,9 +70,9 @@ def _check_place(place: str, patient: Patient) -> None:
         raise ConfigError(error.what, where="places", allowed=error.allowed, mend=mend) from None
 
 
-def check_uncertainty(path: str) -> Checked:
+def check_uncertainty(path: str, changes: Changes = ()) -> Checked:
     """Return what `uncertainty` would do."""
-    study = load_study(path, UncertaintyStudy)
+    study = load_study(path, UncertaintyStudy, changes)
     solver = _base(study, path, springs=True)
     with placed(path):
         patient = load_patient(solver.config.patient)
@@ -82,9 +82,9 @@ def check_uncertainty(path: str) -> Checked:
     return _study(path, "uncertainty", solver, study.draws, what)
 
 
-def check_landscape(path: str) -> Checked:
+def check_landscape(path: str, changes: Changes = ()) -> Checked:
     """Return what `landscape` would do."""
-    study = load_study(path, LandscapeStudy)
+    study = load_study(path, LandscapeStudy, changes)
     solver = _base(study, path, springs=True)
     ranges = _ranges(solver)
     with placed(path):
@@ -102,9 +102,9 @@ def check_landscape(path: str) -> Checked:
     return _study(path, "landscape", solver, solves, what, "at least ")
 
 
-def check_tradeoff(path: str) -> Checked:
+def check_tradeoff(path: str, changes: Changes = ()) -> Checked:
     """Return what `tradeoff` would do."""
-    study = load_study(path, TradeoffStudy)
+    study = load_study(path, TradeoffStudy, changes)
     solver = _base(study, path)
     with placed(path):
         require_prediction(solver.config)
@@ -113,9 +113,9 @@ def check_tradeoff(path: str) -> Checked:
     return _study(path, "tradeoff", solver, count, what, "at least ")
 
 
-def check_batch(path: str) -> Checked:
+def check_batch(path: str, changes: Changes = ()) -> Checked:
     """Return what `batch` would do; every case is checked as a prediction is."""
-    batch = load_cases(path)
+    batch = load_cases(path, changes)
     notes: list[str] = []
     seconds = 0.0
     for case in batch.cases:
@@ -173,7 +173,7 @@ def _study(
             "base",
             f"{solver.config.problem}, {solver.walker.condition}, solved unless --run is given",
         ),
-        *patient_rows(solver.walker.patient),
+        *walker_rows(solver.walker),
         ("does", what),
         ("solves", f"{about}{solves} neighbours of the base, each from its solution"),
         ("expected time", f"for the base {_seconds(base)}"),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs
+from pathwalker_cli.commands.complete import complete_configs, set_option
 from pathwalker_cli.commands.json_output import json_option, print_json
 
 if TYPE_CHECKING:
@@ -44,9 +44,7 @@ __all__ = ["batch_command"]
     metavar="SECONDS",
     help="Give up a case that takes longer. On this machine only.",
 )
-@click.option(
-    "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Override a key of STUDY."
-)
+@set_option("Override a key of STUDY.")
 @click.option("--quiet", is_flag=True, help="Print errors only.")
 @json_option
 def batch_command(

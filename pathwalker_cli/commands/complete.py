@@ -1,23 +1,40 @@
-"""What the shell offers for arguments: problems, configs, patients and run folders."""
+"""What the shell offers for words: problems, configs, patients, run folders, keys of configs."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
 from click.shell_completion import CompletionItem
 
 __all__ = [
     "complete_configs",
+    "complete_keys",
     "complete_patients",
     "complete_problems",
     "complete_runs",
     "runs_argument",
+    "set_option",
 ]
 
-Complete = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
+_DEEPEST: Final = 3
+_MOST_FOLDERS: Final = 300
+"""How far and wide runs are looked for below a folder: an answer must come within a keystroke."""
+
+_SHIPPED: Final = {
+    "batch": "cohort",
+    "id": "inverse-dynamics",
+    "ik": "inverse-kinematics",
+    "landscape": "landscape",
+    "perturb": "perturbation",
+    "sensitivity": "sensitivity",
+    "tradeoff": "tradeoff",
+    "uncertainty": "uncertainty",
+}
+"""Shipped configs of commands that read others than predictions."""
 
 
 def complete_problems(
@@ -52,12 +69,39 @@ def complete_patients(
 def complete_runs(
     context: click.Context, parameter: click.Parameter, begun: str
 ) -> list[CompletionItem]:
-    """Offer folders: runs without a slash behind them, others as a way to go on."""
+    """Offer runs without a slash behind them, and folders below which there are some.
+
+    For `report`, all folders count that a page can be made of.
+    """
+    wanted = _is_reported if context.info_name == "report" else _is_run
     found = []
     for path in _paths(begun, ()):
-        run = (Path(path) / "metrics.json").is_file()
-        found.append(path.removesuffix("/") if run else path)
+        if wanted(Path(path)):
+            found.append(path.removesuffix("/"))
+        elif _holds(Path(path), wanted):
+            found.append(path)
     return _items(found)
+
+
+def complete_keys(
+    context: click.Context, parameter: click.Parameter, begun: str
+) -> list[CompletionItem]:
+    """Offer the dotted keys of the configs that a command reads."""
+    name = _SHIPPED.get(context.info_name or "")
+    keys = _keys_of_shipped(name) if name else _keys_of_predictions()
+    return _items(key for key in keys if key.startswith(begun))
+
+
+def set_option(meaning: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return what adds the option --set to a command, as `changes`."""
+    return click.option(
+        "--set",
+        "changes",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help=meaning,
+        shell_complete=complete_keys,
+    )
 
 
 def runs_argument(metavar: str = "RUN...") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -70,6 +114,72 @@ def runs_argument(metavar: str = "RUN...") -> Callable[[Callable[..., Any]], Cal
         type=click.Path(path_type=Path),
         shell_complete=complete_runs,
     )
+
+
+def _is_run(folder: Path) -> bool:
+    return (folder / "metrics.json").is_file()
+
+
+def _is_reported(folder: Path) -> bool:
+    """Return whether a report can be made of a folder."""
+    from pathwalker_cli.errors import DataError
+    from pathwalker_cli.report.folders import folder_kind
+
+    try:
+        folder_kind(folder)
+    except DataError:
+        return False
+    return True
+
+
+def _holds(folder: Path, wanted: Callable[[Path], bool]) -> bool:
+    """Return whether there is a wanted folder below one, or too much to know at once."""
+    level, seen = [folder], 0
+    for _ in range(_DEEPEST):
+        below = [inner for outer in level for inner in _folders(outer)]
+        if any(map(wanted, below)) or (seen := seen + len(below)) > _MOST_FOLDERS:
+            return True
+        level = below
+    return False
+
+
+def _folders(folder: Path) -> list[Path]:
+    """Return the visible folders in a folder; none if it may not be read."""
+    try:
+        with os.scandir(folder) as entries:
+            names = [e.name for e in entries if e.is_dir() and not e.name.startswith(".")]
+    except OSError:
+        return []
+    return [folder / name for name in sorted(names)]
+
+
+def _keys_of_predictions() -> Iterator[str]:
+    """Yield the keys of the config of a prediction, from its model."""
+    from pathwalker_cli.config import StudyConfig
+    from pathwalker_cli.io.described import is_model
+
+    for name, field in StudyConfig.model_fields.items():
+        block = field.annotation
+        if block is not None and is_model(block):
+            yield from (f"{name}.{key}" for key in block.model_fields)
+        else:
+            yield name
+
+
+def _keys_of_shipped(name: str) -> Iterator[str]:
+    """Yield the keys of a shipped config, which holds all; models of studies take long to import.
+
+    Below a key whose own keys have dots, overrides cannot reach.
+    """
+    from pathwalker_cli.io.yaml_file import read_mapping
+    from pathwalker_cli.paths import shipped
+
+    content, _ = read_mapping(shipped("configs") / f"{name}.yaml")
+    for key, value in content.items():
+        if isinstance(value, dict) and value and not any("." in inner for inner in value):
+            yield from (f"{key}.{inner}" for inner in value)
+        else:
+            yield key
 
 
 def _items(values: Iterable[str]) -> list[CompletionItem]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs, complete_runs
+from pathwalker_cli.commands.complete import complete_configs, complete_runs, set_option
 from pathwalker_cli.commands.json_output import json_option
 
 if TYPE_CHECKING:
@@ -30,13 +30,7 @@ _OPTIONS = (
         shell_complete=complete_runs,
         help="Folder of a converged run to stand on, instead of solving the base.",
     ),
-    click.option(
-        "--set",
-        "changes",
-        multiple=True,
-        metavar="KEY=VALUE",
-        help="Override a value of CONFIG; 'set={KEY: VALUE}' overrides one of the base.",
-    ),
+    set_option("Override a value of CONFIG; 'set={KEY: VALUE}' overrides one of the base."),
     click.option("--quiet", is_flag=True, help="Print errors only."),
     json_option,
 )

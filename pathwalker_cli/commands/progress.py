@@ -30,10 +30,14 @@ class Progress(RunLog):
     Args:
         quiet: Whether nothing shall be shown.
         console: Where to show it; stderr if left out.
+        heading: Lines to show before the first iteration, once nothing was refused.
     """
 
-    def __init__(self, quiet: bool = False, console: Console | None = None) -> None:
+    def __init__(
+        self, quiet: bool = False, console: Console | None = None, heading: tuple[str, ...] = ()
+    ) -> None:
         super().__init__()
+        self._heading = heading
         self._console = console or Console(stderr=True)
         self._quiet = quiet
         self._live: Live | None = None
@@ -67,6 +71,7 @@ class Progress(RunLog):
 
     def __call__(self, stage: str, report: ProgressReport) -> None:
         """Take note of one iteration."""
+        self._begin()
         if stage != self._stage:
             self._end_stage()
             self._stage = stage
@@ -79,10 +84,16 @@ class Progress(RunLog):
 
     def optimum(self, found: LocalOptimum) -> None:
         """Take note of where one of several starts ended."""
+        self._begin()
         self._end_stage()
         super().optimum(found)
         self._last = self.lines[-1]
         self._print()
+
+    def _begin(self) -> None:
+        heading, self._heading = self._heading, ()
+        for line in heading if not self._quiet else ():
+            self._console.print(Text(line), soft_wrap=True)
 
     def _redraw(self) -> None:
         now = time.perf_counter()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs, complete_patients
+from pathwalker_cli.commands.complete import complete_configs, complete_patients, set_option
 from pathwalker_cli.commands.json_output import json_option, print_json
 from pathwalker_cli.conventions import CONDITIONS, Condition
 
@@ -27,9 +27,7 @@ __all__ = ["id_command", "ik_command", "import_command"]
 
 _OUT = click.option("--out", type=click.Path(path_type=Path), help="Output folder.")
 _QUIET = click.option("--quiet", is_flag=True, help="Print warnings only.")
-_SET = click.option(
-    "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Override a config value."
-)
+_SET = set_option("Override a config value.")
 
 
 @click.command("import")

@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs, complete_problems, complete_runs
+from pathwalker_cli.commands.complete import (
+    complete_configs,
+    complete_problems,
+    complete_runs,
+    set_option,
+)
 from pathwalker_cli.commands.json_output import json_option, print_json
 
 if TYPE_CHECKING:
@@ -40,9 +45,7 @@ __all__ = ["solve_command"]
     help="Folder of a converged run of the same condition to begin with.",
 )
 @click.option("--smoke", is_flag=True, help="Coarse mesh without refinement, for a quick check.")
-@click.option(
-    "--set", "changes", multiple=True, metavar="KEY=VALUE", help="Override a config value."
-)
+@set_option("Override a config value.")
 @click.option("--quiet", is_flag=True, help="Print errors only.")
 @json_option
 def solve_command(
@@ -68,7 +71,7 @@ def solve_command(
 
     study, patient = _study(problem, config, changes, smoke)
     folder = out or default_folder(study, patient.id)
-    with Progress(quiet) as progress:
+    with Progress(quiet, heading=_worn(study, patient)) as progress:
         outcome = run_study(study, folder, warm_start, progress)
     solution = outcome.solution
     if as_json:
@@ -84,11 +87,17 @@ def _study(
 ) -> tuple[StudyConfig, Patient]:
     """Return the config with all overrides, and its patient."""
     from pathwalker_cli.config import load_config, smoke_version, study_patient
-    from pathwalker_cli.errors import PatientError
+    from pathwalker_cli.errors import ConfigError, PatientError
     from pathwalker_cli.problems import problem_named
 
     problem_named(problem)
-    study = load_config(path, problem, changes)
+    try:
+        study = load_config(path, problem, changes)
+    except ConfigError:
+        from pathwalker_cli.checking.kinds import meant_as_prediction
+
+        with meant_as_prediction(path):
+            raise
     try:
         patient = study_patient(study)
     except PatientError as error:
@@ -99,6 +108,15 @@ def _study(
             error.what, where=where, allowed=error.allowed, mend=error.mend
         ) from None
     return smoke_version(study) if smoke else study, patient
+
+
+def _worn(study: StudyConfig, patient: Patient) -> tuple[str, ...]:
+    """Return what is worn, to be read while the solve runs: a wrong sign shows as a direction."""
+    from pathwalker_cli.output.orthosis_text import orthosis_rows
+
+    if study.condition == "barefoot" or patient.orthosis is None:
+        return ()
+    return tuple(f"{label}: {text}" for label, text in orthosis_rows(patient.orthosis))
 
 
 def _content(outcome: Outcome, folder: Path) -> dict[str, Any]:

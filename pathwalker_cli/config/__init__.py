@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from pathwalker_cli.config.files import find_config, load_config, patient_path, study_patient
+from pathwalker_cli.config.files import (
+    config_content,
+    find_config,
+    load_config,
+    patient_path,
+    place_of,
+    read_config,
+    study_patient,
+)
 from pathwalker_cli.config.overrides import apply_change, smoke_version, with_values
 from pathwalker_cli.config.schema import (
     BoundsConfig,
@@ -23,9 +31,12 @@ __all__ = [
     "StartConfig",
     "StudyConfig",
     "apply_change",
+    "config_content",
     "find_config",
     "load_config",
     "patient_path",
+    "place_of",
+    "read_config",
     "smoke_version",
     "study_patient",
     "with_values",

@@ -3,17 +3,31 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
 
 from pathwalker_cli.config.overrides import apply_change
 from pathwalker_cli.config.schema import StudyConfig
-from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.io.yaml_file import read_mapping, validate
+from pathwalker_cli.errors import ConfigError, did_you_mean
+from pathwalker_cli.io.yaml_file import KeyPath, Lines, read_mapping, validate
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.variation import varied
 
-__all__ = ["find_config", "load_config", "patient_path", "study_patient"]
+__all__ = [
+    "config_content",
+    "find_config",
+    "load_config",
+    "patient_path",
+    "place_of",
+    "read_config",
+    "study_patient",
+]
+
+Model = TypeVar("Model", bound=BaseModel)
 
 
 def load_config(path: str | Path, problem: str = "", changes: tuple[str, ...] = ()) -> StudyConfig:
@@ -27,18 +41,64 @@ def load_config(path: str | Path, problem: str = "", changes: tuple[str, ...] = 
     Raises:
         ConfigError: If file or overrides are wrong.
     """
-    source = find_config(Path(path))
-    mapping, lines = read_mapping(source, ConfigError)
-    for change in changes:
-        apply_change(mapping, change)
-    config = validate(mapping, StudyConfig, where=str(path), error=ConfigError, lines=lines)
+    config, source = read_config(path, StudyConfig, changes)
     if problem and config.problem != problem:
         raise ConfigError(
             f"is a config for {config.problem}, but {problem} was asked for",
             where=f"{path}, problem",
-            mend=f"use configs/{problem}.yaml, or ask for {config.problem}",
+            mend=f"use the shipped config {problem}, or ask for {config.problem}",
         )
-    return config.model_copy(update={"patient": patient_path(config.patient, source)})
+    folder = place_of("patient", source, changes)
+    return config.model_copy(update={"patient": patient_path(config.patient, folder)})
+
+
+def read_config(
+    path: str | Path,
+    model: type[Model],
+    changes: tuple[str, ...] = (),
+    apply: Callable[[dict[str, Any], str], KeyPath] = apply_change,
+) -> tuple[Model, Path]:
+    """Read a config of any kind; return it and its file.
+
+    Args:
+        path: The YAML file, or the name of a shipped one.
+        model: Model of its content.
+        changes: Overrides "dotted.key=value", as from the command line.
+        apply: Puts one of them into the content and returns the key that it changes.
+
+    Raises:
+        ConfigError: If file or overrides are wrong.
+    """
+    source, mapping, lines = config_content(path)
+    origins = dict(lines)
+    for change in changes:
+        key = apply(mapping, change)
+        for replaced in [k for k in origins if k[: len(key)] == key]:
+            del origins[replaced]
+        origins[key] = f"--set {change}"
+    return validate(mapping, model, where=str(path), error=ConfigError, lines=origins), source
+
+
+def config_content(path: str | Path) -> tuple[Path, dict[str, Any], Lines]:
+    """Return the file of a config, what it holds, and the line of each of its keys.
+
+    Raises:
+        ConfigError: If it cannot be read.
+    """
+    source = find_config(Path(path))
+    if not os.path.exists(source):
+        near = [file.stem for file in shipped("configs").glob("*.yaml")]
+        if os.path.isdir(source.parent):
+            near += [file.stem for file in source.parent.glob("*.yaml")]
+        if mend := did_you_mean(source.stem, near):
+            raise ConfigError("no such file", where=str(path), mend=mend)
+    return source, *read_mapping(source, ConfigError)
+
+
+def place_of(key: str, source: Path, changes: tuple[str, ...]) -> Path:
+    """Return the folder that a path at a key counts from: here if an override gave it."""
+    overridden = {change.partition("=")[0].strip() for change in changes}
+    return Path() if key in overridden else source.parent
 
 
 def find_config(path: Path) -> Path:
@@ -51,9 +111,9 @@ def find_config(path: Path) -> Path:
     return path
 
 
-def patient_path(patient: str, config_file: Path) -> str:
-    """Return a patient path relative to the config's folder as a full path; ids stay."""
-    candidate = config_file.parent / patient
+def patient_path(patient: str, folder: Path) -> str:
+    """Return a patient path relative to a folder as a full path; ids stay."""
+    candidate = folder / patient
     return str(candidate.resolve()) if "/" in patient or os.path.isfile(candidate) else patient
 
 

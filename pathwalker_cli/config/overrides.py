@@ -8,20 +8,28 @@ from typing import Any
 from pathwalker_cli.config.nested import holder, merged
 from pathwalker_cli.config.schema import StudyConfig
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.io.yaml_file import read_value, validate
+from pathwalker_cli.io.yaml_file import KeyPath, read_value, validate
 from pathwalker_cli.model.contact import PHASE_NAMES
 
 __all__ = ["apply_change", "smoke_version", "with_values"]
 
 
-def apply_change(mapping: dict[str, Any], change: str) -> None:
-    """Put one override "a.b=value" into a mapping; the value is read as YAML."""
+def apply_change(mapping: dict[str, Any], change: str) -> KeyPath:
+    """Put one override "a.b=value" into a mapping; the value is read as YAML.
+
+    Returns:
+        The key that was overridden.
+
+    Raises:
+        ConfigError: If it is no override, or there is no such place.
+    """
     key, equals, text = change.partition("=")
     if not equals or not key.strip():
         raise ConfigError(f"'{change}' is no override", where="--set", allowed="dotted.key=value")
-    value = read_value(text, f"--set {key}")
-    inner, last = holder(mapping, key.strip(), f"--set {key}")
+    value = read_value(text, f"--set {change}")
+    inner, last = holder(mapping, key.strip(), f"--set {change}")
     inner[last] = value
+    return tuple(key.strip().split("."))
 
 
 def with_values(config: StudyConfig, values: Mapping[str, Any], where: str = "") -> StudyConfig:

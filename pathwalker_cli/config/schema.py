@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Collection, Iterable
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
 from pathwalker_cli.config.nested import merged
 from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, Condition
+from pathwalker_cli.errors import did_you_mean
 from pathwalker_cli.goals import COMFORT_COORDINATES, GOALS, Goals
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.model.contact import PHASE_NAMES
@@ -27,7 +28,6 @@ __all__ = [
 ]
 
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
-Range = Annotated[tuple[Angle, Angle], AS_TUPLE]
 Seconds = Annotated[float, Quantity("s", 0.005, 2.0, above="is it in milliseconds?")]
 Weight = Annotated[float, Quantity("", 0.0, 1e6)]
 Share = Annotated[float, Quantity("", 0.0, 1.0)]
@@ -41,18 +41,28 @@ def _ordered(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
+def _no_number(value: Any) -> Any:
+    """Refuse one number in place of a range, and say how a range prescribes it."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        mend = f"[{value:g}, {value:g}] prescribes {value:g}"
+        raise invalid(f"is {value:g}", allowed="a range [lower, upper]", mend=mend)
+    return value
+
+
+ORDERED: Final = AfterValidator(_ordered)
+Range = Annotated[tuple[Angle, Angle], AS_TUPLE, ORDERED]
+Durations = Annotated[tuple[Seconds, Seconds], AS_TUPLE, ORDERED]
+StiffnessRange = Annotated[
+    tuple[Stiffness, Stiffness], AS_TUPLE, BeforeValidator(_no_number), ORDERED
+]
+
+
 def _named(names: Iterable[str], allowed: Collection[str]) -> None:
     """Refuse a name that there is not."""
     for name in names:
         if name not in allowed:
-            raise invalid(f"names '{name}'", allowed=", ".join(allowed))
-
-
-def _named_ranges(ranges: Mapping[str, tuple[float, float]], allowed: Collection[str]) -> None:
-    """Refuse ranges of what there is not, and those that are upside down."""
-    _named(ranges, allowed)
-    for pair in ranges.values():
-        _ordered(pair)
+            known = ", ".join(allowed)
+            raise invalid(f"names '{name}'", allowed=known, mend=did_you_mean(name, allowed))
 
 
 def _as_text(value: Any) -> Any:
@@ -89,7 +99,7 @@ class CostConfig(YamlModel):
     @field_validator("comfort_ranges")
     @classmethod
     def _comfort(cls, value: dict[str, Range]) -> dict[str, Range]:
-        _named_ranges(value, COMFORT_COORDINATES)
+        _named(value, COMFORT_COORDINATES)
         return value
 
     @model_validator(mode="after")
@@ -127,17 +137,13 @@ class BoundsConfig(YamlModel):
     )
     least_walking_speed: Literal["recorded"] | Speed = "recorded"
     fallback_speed_ratio: Annotated[float, Quantity("", 0.0, 1.0)] = 0.25
-    phase_duration: Annotated[tuple[Seconds, Seconds], AS_TUPLE] = (0.02, 0.45)
-    phase_durations: dict[str, Annotated[tuple[Seconds, Seconds], AS_TUPLE]] = Field(
-        default_factory=dict
-    )
-    distance: Annotated[tuple[Metres, Metres], AS_TUPLE] = (0.3, 3.0)
+    phase_duration: Durations = (0.02, 0.45)
+    phase_durations: dict[str, Durations] = Field(default_factory=dict)
+    distance: Annotated[tuple[Metres, Metres], AS_TUPLE, ORDERED] = (0.3, 3.0)
     joint_speed: Annotated[float, Quantity("rad/s", 1.0, 100.0)] = 30.0
-    dorsiflexion_stiffness: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE] | None = None
-    plantarflexion_stiffness: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE] | None = None
-    stiffness: dict[str, Annotated[tuple[Stiffness, Stiffness], AS_TUPLE]] = Field(
-        default_factory=dict
-    )
+    dorsiflexion_stiffness: StiffnessRange | None = None
+    plantarflexion_stiffness: StiffnessRange | None = None
+    stiffness: dict[str, StiffnessRange] = Field(default_factory=dict)
     friction: Annotated[float, Quantity("", 0.05, 2.0)] = 0.8
     least_vertical_force: Annotated[float, Quantity("N", 0.0, 50.0)] = 0.0
     least_height: Annotated[float, Quantity("m", -0.02, 0.0)] = -1e-3
@@ -145,27 +151,20 @@ class BoundsConfig(YamlModel):
     @field_validator("joint_ranges", "fallback_joint_ranges")
     @classmethod
     def _coordinates(cls, value: dict[str, Range]) -> dict[str, Range]:
-        _named_ranges(value, COORDINATES[2:])
+        _named(value, COORDINATES[2:])
         return value
 
     @field_validator("phase_durations")
     @classmethod
     def _phases(cls, value: dict[str, Any]) -> dict[str, Any]:
-        _named_ranges(value, PHASE_NAMES)
+        _named(value, PHASE_NAMES)
         return value
 
     @field_validator("stiffness")
     @classmethod
     def _springs(cls, value: dict[str, Any]) -> dict[str, Any]:
-        _named_ranges(value, STIFFNESSES)
+        _named(value, STIFFNESSES)
         return value
-
-    @field_validator(
-        "phase_duration", "distance", "dorsiflexion_stiffness", "plantarflexion_stiffness"
-    )
-    @classmethod
-    def _pairs(cls, value: tuple[float, float] | None) -> tuple[float, float] | None:
-        return value if value is None else _ordered(value)
 
 
 class MeshConfig(YamlModel):
@@ -255,7 +254,8 @@ class StudyConfig(YamlModel):
     @classmethod
     def _known(cls, value: str) -> str:
         if value not in PROBLEMS:
-            raise invalid(f"is '{value}'", allowed=", ".join(PROBLEMS))
+            allowed = ", ".join(PROBLEMS)
+            raise invalid(f"is '{value}'", allowed=allowed, mend=did_you_mean(value, PROBLEMS))
         return value
 
     @model_validator(mode="after")

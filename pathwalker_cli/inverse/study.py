@@ -9,13 +9,12 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import Field, field_validator, model_validator
 
 # The lookup of files, overrides and patients is the same for all configs.
-from pathwalker_cli.config import apply_change, find_config, patient_path
+from pathwalker_cli.config import patient_path, place_of, read_config
 from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.inverse.filters import MOTION_CUTOFF
 from pathwalker_cli.inverse.gaps import LONGEST_GAP
 from pathwalker_cli.io.fields import Quantity, YamlModel, invalid
-from pathwalker_cli.io.yaml_file import read_mapping, validate
 
 __all__ = [
     "InverseDynamicsConfig",
@@ -144,17 +143,10 @@ def load_inverse_dynamics(path: str | Path, changes: tuple[str, ...] = ()) -> In
 
 def _load(path: str | Path, changes: tuple[str, ...], model_class: type[Config]) -> Config:
     """Read a config; its paths count from its own folder, those of overrides from here."""
-    source = find_config(Path(path))
-    mapping, lines = read_mapping(source, ConfigError)
-    for change in changes:
-        apply_change(mapping, change)
-    config = validate(mapping, model_class, where=str(path), error=ConfigError, lines=lines)
-    overridden = {change.partition("=")[0].strip() for change in changes}
+    config, source = read_config(path, model_class, changes)
 
     def placed(file: str, key: str) -> str:
-        folders = (source.parent, Path())
-        if key in overridden:
-            folders = folders[::-1]
+        folders = (place_of(key, source, changes), source.parent, Path())
         found = (folder / file for folder in folders if os.path.exists(folder / file))
         return str(next(found, file))
 
@@ -163,7 +155,7 @@ def _load(path: str | Path, changes: tuple[str, ...], model_class: type[Config])
         for condition in config.conditions
     }
     changed = {
-        "patient": patient_path(config.patient, source),
+        "patient": patient_path(config.patient, place_of("patient", source, changes)),
         "c3d": Paths(**paths),
         "markers": placed(config.markers, "markers") if config.markers else None,
     }

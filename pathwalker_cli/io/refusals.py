@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from pydantic import BaseModel, ValidationError
 
-from pathwalker_cli.errors import InputError
+from pathwalker_cli.errors import InputError, did_you_mean
 
 __all__ = ["KeyPath", "Lines", "allowed_keys", "dotted", "place", "sentence"]
 
 KeyPath = tuple[str | int, ...]
-Lines = Mapping[KeyPath, int]
-"""Line number (from 1) of every key of a file."""
+Lines = Mapping[KeyPath, int | str]
+"""Line number (from 1) of every key of a file, or the override that stands in its place."""
 
 _PLAIN: Final = {
     "tuple_type": "a list, e.g. [1.0, 2.0]",
@@ -43,8 +42,12 @@ def dotted(path: KeyPath) -> str:
 
 
 def place(where: str, path: KeyPath, lines: Lines) -> str:
-    """Return "file, line 3: key" from what is known."""
-    line = lines.get(path) or lines.get(path[:-1])
+    """Return "file, line 3: key" from what is known, or "--set key=value" for an override."""
+    above = [path[:end] for end in range(len(path), 0, -1)]
+    for key in above:
+        if isinstance(override := lines.get(key), str):
+            return override if key == path else f"{override}: {dotted(path)}"
+    line = next((lines[key] for key in above[:2] if key in lines), None)
     origin = f"{where}, line {line}" if where and line else where
     return ": ".join(part for part in (origin, dotted(path)) if part)
 
@@ -70,7 +73,9 @@ def sentence(
     problems = sorted(problem.errors(), key=lambda item: item["type"] != "extra_forbidden")
     first: Any = problems[0]
     path = _path_in(mapping, first["loc"])
-    what, allowed, mend = _clauses(first, path, model_class)
+    what, allowed, mend = _alternatives(
+        [item for item in problems if _path_in(mapping, item["loc"]) == path], path, model_class
+    )
     others = sorted({dotted(_path_in(mapping, item["loc"])) for item in problems} - {dotted(path)})
     if others:
         mend = (
@@ -93,6 +98,26 @@ def _path_in(mapping: Any, location: tuple[str | int, ...]) -> KeyPath:
     return tuple(path)
 
 
+def _alternatives(
+    problems: Sequence[Any], path: KeyPath, model_class: type[BaseModel]
+) -> tuple[str, str, str]:
+    """Return what is wrong with one value, what is allowed and how to mend it.
+
+    Several problems of one value are those of the kinds that it might be of, e.g. a word or a
+    number: all that is allowed is told.
+    """
+    found = [_clauses(problem, path, model_class) for problem in problems]
+    if len(found) == 1:
+        return found[0]
+    value = problems[0]["input"]
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    units = [c for p, c in zip(problems, found, strict=True) if p["type"] == "pathwalker"]
+    what, _, mend = units[0] if number and units else (f"is {_shown(value)}", "", "")
+    # A unit alone does not say that a number is meant where words are allowed too.
+    allowed = [f"a number, {text}" if c in units else text for c in found if (text := c[1])]
+    return what, " or ".join(dict.fromkeys(allowed)), mend
+
+
 def _clauses(problem: Any, path: KeyPath, model_class: type[BaseModel]) -> tuple[str, str, str]:
     """Return what is wrong, what is allowed and how to mend it."""
     kind, context, value = problem["type"], problem.get("ctx", {}), problem["input"]
@@ -100,8 +125,7 @@ def _clauses(problem: Any, path: KeyPath, model_class: type[BaseModel]) -> tuple
         return context["what"], context["allowed"], context["mend"]
     if kind == "extra_forbidden":
         known = allowed_keys(model_class, problem["loc"][:-1])
-        close = difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0.5)
-        mend = f"did you mean '{close[0]}'?" if close else "remove it"
+        mend = did_you_mean(str(path[-1]), known, otherwise="remove it")
         return "unknown key", ", ".join(known), mend
     if kind == "missing" and isinstance(problem["loc"][-1], int):
         return "has too few entries", "", "give one more"

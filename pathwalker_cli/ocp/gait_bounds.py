@@ -163,8 +163,9 @@ def _least_speed(walker: Walker, config: BoundsConfig, sources: dict[str, str]) 
         speed, source = recorded.walking_speed.mean, "mean of the barefoot recordings"
     else:
         ratio = config.fallback_speed_ratio
-        speed = ratio * float(np.sqrt(GRAVITY * walker.leg_length))
-        source = f"fallback: {ratio:g} sqrt(g leg length), the patient has no recordings"
+        # The shoe lengthens the leg, but both conditions must be asked for the same speed.
+        speed = ratio * float(np.sqrt(GRAVITY * walker.patient.leg_length))
+        source = f"fallback: {ratio:g} sqrt(g barefoot leg length), the patient has no recordings"
     sources["walking_speed"] = f"at least {speed:.3f} m/s, {source}"
     return speed
 

@@ -10,14 +10,13 @@ from pydantic import Field
 
 from pathwalker_cli.config import (
     StudyConfig,
-    apply_change,
-    find_config,
     load_config,
+    place_of,
+    read_config,
     with_values,
 )
-from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
+from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.io.fields import YamlModel
-from pathwalker_cli.io.yaml_file import read_mapping, validate
 from pathwalker_cli.ocp.resolve import Optimum, Resolver
 from pathwalker_cli.output.run_folder import Run, load_run
 from pathwalker_cli.studies.run import RunLog, is_done, run_study
@@ -56,13 +55,9 @@ def load_study(path: str | Path, model: type[Study], changes: tuple[str, ...] = 
     Raises:
         ConfigError: If file or overrides are wrong.
     """
-    source = find_config(Path(path))
-    mapping, lines = read_mapping(source, ConfigError)
-    for change in changes:
-        apply_change(mapping, change)
-    study = validate(mapping, model, where=str(path), error=ConfigError, lines=lines)
+    study, source = read_config(path, model, changes)
     base = getattr(study, "base", "")
-    beside = source.parent / base
+    beside = place_of("base", source, changes) / base
     return (
         study.model_copy(update={"base": str(beside.resolve())})
         if base and os.path.isfile(beside)

@@ -8,7 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.config import StudyConfig, place_of, with_values
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.studies.batch.checks import check_case, check_warm_start
 from pathwalker_cli.studies.batch.names import case_name, short_keys
@@ -66,10 +66,11 @@ def load_cases(path: str | Path, changes: tuple[str, ...] = ()) -> Batch:
     """
     study, source = load_batch(path, changes)
     where = str(path)
-    patients = listed_patients(study.patients, source, where)
+    folders = {key: place_of(key, source, changes) for key in ("patients", "problems")}
+    patients = listed_patients(study.patients, folders["patients"], source, where)
     problems = {
         name: overridden(config, study.set, f"{where}, set, problem {name}")
-        for name, config in listed_problems(study.problems, source, where).items()
+        for name, config in listed_problems(study.problems, folders["problems"], where).items()
     }
     warm_starts = _warm_starts(study, problems, source, where)
     cases: dict[str, Case] = {}

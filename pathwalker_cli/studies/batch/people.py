@@ -15,12 +15,15 @@ from pathwalker_cli.studies.batch.names import slug
 __all__ = ["listed_patients", "listed_problems"]
 
 
-def listed_patients(entries: tuple[str, ...], source: Path, where: str) -> dict[str, Patient]:
+def listed_patients(
+    entries: tuple[str, ...], folder: Path, source: Path, where: str
+) -> dict[str, Patient]:
     """Return all patients by what a config calls them: a shipped id or a full path.
 
     Args:
-        entries: Shipped ids, files, folders and patterns, relative to the study's file.
-        source: The study's file.
+        entries: Shipped ids, files, folders and patterns.
+        folder: Folder that they are relative to.
+        source: The study's file, which is no patient.
         where: The study, for messages.
 
     Raises:
@@ -30,7 +33,7 @@ def listed_patients(entries: tuple[str, ...], source: Path, where: str) -> dict[
     found: dict[str, Patient] = {}
     owners: dict[str, str] = {}
     for entry in entries:
-        for name in _names(entry, source, f"{where}: patients"):
+        for name in _names(entry, folder, source, f"{where}: patients"):
             patient = load_patient(name)
             if name in found:
                 what = f"'{entry}' leads to {name}, which is listed already"
@@ -43,14 +46,14 @@ def listed_patients(entries: tuple[str, ...], source: Path, where: str) -> dict[
     return found
 
 
-def _names(entry: str, source: Path, where: str) -> Iterator[str]:
+def _names(entry: str, folder: Path, source: Path, where: str) -> Iterator[str]:
     """Yield what an entry leads to, in order of the names."""
     if entry in shipped_patients():
         yield entry
         return
     pattern = any(mark in entry for mark in "*?[")
-    paths = glob.glob(entry, root_dir=source.parent, recursive=True) if pattern else [entry]
-    files = [file for path in sorted(paths) for file in _files((source.parent / path).resolve())]
+    paths = glob.glob(entry, root_dir=folder, recursive=True) if pattern else [entry]
+    files = [file for path in sorted(paths) for file in _files((folder / path).resolve())]
     files = [file for file in files if file != source]
     if not files:
         raise ConfigError(
@@ -71,12 +74,12 @@ def _files(path: Path) -> list[Path]:
     return sorted([*path.glob("*.yaml"), *path.glob("*/patient.yaml")])
 
 
-def listed_problems(entries: tuple[str, ...], source: Path, where: str) -> dict[str, StudyConfig]:
+def listed_problems(entries: tuple[str, ...], folder: Path, where: str) -> dict[str, StudyConfig]:
     """Return the config of every problem by its name, which is that of its file.
 
     Args:
-        entries: Names of shipped configs, or config files relative to the study's file.
-        source: The study's file.
+        entries: Names of shipped configs, or config files.
+        folder: Folder that they are relative to.
         where: The study, for messages.
 
     Raises:
@@ -84,7 +87,7 @@ def listed_problems(entries: tuple[str, ...], source: Path, where: str) -> dict[
     """
     found: dict[str, StudyConfig] = {}
     for entry in entries:
-        beside = source.parent / entry
+        beside = folder / entry
         path = beside if beside.is_file() else find_config(Path(entry))
         if not path.is_file():
             raise ConfigError(

@@ -9,10 +9,10 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, field_validator, model_validator
 
-from pathwalker_cli.config import StudyConfig, apply_change, find_config
+from pathwalker_cli.config import StudyConfig, apply_change, read_config
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import YamlModel, invalid
-from pathwalker_cli.io.yaml_file import read_mapping, read_value, validate
+from pathwalker_cli.io.yaml_file import KeyPath, read_value
 
 __all__ = ["BatchStudy", "NamedCase", "flat", "load_batch"]
 
@@ -91,16 +91,12 @@ def load_batch(path: str | Path, changes: tuple[str, ...] = ()) -> tuple[BatchSt
     Raises:
         ConfigError: If file or overrides are wrong.
     """
-    source = find_config(Path(path))
-    mapping, lines = read_mapping(source, ConfigError)
-    for change in changes:
-        _apply(mapping, change)
-    study = validate(mapping, BatchStudy, where=str(path), error=ConfigError, lines=lines)
+    study, source = read_config(path, BatchStudy, changes, _apply)
     return study, source.resolve()
 
 
-def _apply(mapping: dict[str, Any], change: str) -> None:
-    """Put one override into the content of the file."""
+def _apply(mapping: dict[str, Any], change: str) -> KeyPath:
+    """Put one override into the content of the file; return the key that it changes."""
     key, equals, text = change.partition("=")
     head, dot, rest = key.strip().partition(".")
     if equals and head in StudyConfig.model_fields and head not in BatchStudy.model_fields:
@@ -111,9 +107,9 @@ def _apply(mapping: dict[str, Any], change: str) -> None:
             mend=f"for a value of every case: --set set.{change}",
         )
     if not (equals and dot and head in _DOTTED):
-        apply_change(mapping, change)
-        return
+        return apply_change(mapping, change)
     holder = mapping.setdefault(head, {})
     if not isinstance(holder, dict):
-        raise ConfigError(f"'{head}' holds no keys", where=f"--set {key}")
-    holder[rest] = read_value(text, f"--set {key}")
+        raise ConfigError(f"'{head}' holds no keys", where=f"--set {change}")
+    holder[rest] = read_value(text, f"--set {change}")
+    return head, rest
