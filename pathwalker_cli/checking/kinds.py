@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -25,7 +24,7 @@ from pathwalker_cli.studies.sensitivity.study import SensitivityStudy
 from pathwalker_cli.studies.tradeoff.study import TradeoffStudy
 from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy
 
-__all__ = ["KINDS", "Kind", "check_file", "meant_as_prediction"]
+__all__ = ["KINDS", "Kind", "another_kind", "check_file"]
 
 Check = Callable[[str, Changes], Checked]
 
@@ -80,37 +79,36 @@ def check_file(path: str, problem: str = "", changes: Changes = ()) -> Checked:
     """
     if problem:
         problem_named(problem)
-        with meant_as_prediction(path):
+        try:
             return check_prediction(path, changes, problem)
+        except ConfigError as error:
+            raise another_kind(path, "prediction") or error from None
     kind = _kind_of(path)
     # A shipped marker set is read where it lies: it has no loader that knows names.
     file = str(find_config(Path(path))) if kind == "markers" else path
     return KINDS[kind].check(file, changes)
 
 
-@contextmanager
-def meant_as_prediction(path: str) -> Iterator[None]:
-    """Say of a config that is refused, if so, that it is a file of another kind, and whose.
+def another_kind(path: str, kind: str) -> ConfigError | None:
+    """Return what to say of a file that is refused, if it is one of another kind; None if not.
 
     Args:
-        path: The config, a file or the name of a shipped one.
+        path: A file, the name of a shipped config, or a patient.
+        kind: The kind that it is not accepted as.
     """
     try:
-        yield
+        found = _kind_of(path)
     except ConfigError:
-        try:
-            kind = _kind_of(path)
-        except ConfigError:
-            kind = "prediction"
-        if kind == "prediction":
-            raise
-        a = "an" if kind[0] in "aeiou" else "a"
-        raise ConfigError(
-            f"is {a} {kind} file, not the config of a prediction",
-            where=path,
-            allowed="a config with the key problem",
-            mend=f"this file is for {KINDS[kind].taken_by}",
-        ) from None
+        return None
+    if found == kind:
+        return None
+    a = "an" if found[0] in "aeiou" else "a"
+    return ConfigError(
+        f"is {a} {found} file",
+        where=path,
+        allowed=f"a file for {KINDS[kind].taken_by}",
+        mend=f"this file is for {KINDS[found].taken_by}",
+    )
 
 
 def _kind_of(path: str) -> str:

@@ -10,6 +10,7 @@ import click
 
 from pathwalker_cli.commands.complete import complete_configs, set_option
 from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.kinds import meant_as
 
 if TYPE_CHECKING:
     from pathwalker_cli.studies.batch.worker import Pool
@@ -70,7 +71,8 @@ def batch_command(
     from pathwalker_cli.studies.batch.study import run_batch
     from pathwalker_cli.studies.batch.text import failure_sentence, report_content, report_text
 
-    batch = load_cases(study, changes)
+    with meant_as("cohort", study):
+        batch = load_cases(study, changes)
     folder = out or Path("runs") / batch.name
     with _pool(workers, scheduler, time_limit) as pool, BatchProgress(quiet) as progress:
         report = run_batch(batch.cases, folder, pool, progress)

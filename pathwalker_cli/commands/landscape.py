@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from pathwalker_cli.commands.json_output import print_json
+from pathwalker_cli.commands.kinds import meant_as
 from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
 
 __all__ = ["landscape_command"]
@@ -35,7 +36,8 @@ def landscape_command(
     from pathwalker_cli.studies.landscape.study import LandscapeStudy
     from pathwalker_cli.studies.landscape.text import landscape_lines
 
-    study = load_study(config, LandscapeStudy, changes)
+    with meant_as("landscape", config):
+        study = load_study(config, LandscapeStudy, changes)
     check_folder(out, ENTRIES, "landscape")
     landscape = landscape_of(study, base_of(study, run, out, quiet), out / "points", teller(quiet))
     write_landscape(out, landscape)

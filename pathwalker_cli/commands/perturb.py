@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pathwalker_cli.commands.json_output import print_json
+from pathwalker_cli.commands.kinds import meant_as
 from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
 
 if TYPE_CHECKING:
@@ -47,7 +48,8 @@ def perturb_command(
         write_perturbation,
     )
 
-    study = load_study(config, PerturbationStudy, changes)
+    with meant_as("perturbation", config):
+        study = load_study(config, PerturbationStudy, changes)
     check_folder(out, ENTRIES, "perturb")
     base = base_with_springs(study, run, out, quiet)
     tell = teller(quiet)

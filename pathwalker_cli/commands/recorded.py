@@ -11,6 +11,7 @@ import click
 
 from pathwalker_cli.commands.complete import complete_configs, complete_patients, set_option
 from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.kinds import meant_as
 from pathwalker_cli.conventions import CONDITIONS, Condition
 
 if TYPE_CHECKING:
@@ -84,7 +85,8 @@ def ik_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: b
         write_kinematics(folder, trials, patient.body_mass)
         return _Findings()
 
-    study = load_inverse_kinematics(config, changes)
+    with meant_as("inverse-kinematics", config):
+        study = load_inverse_kinematics(config, changes)
     _study(study, kinematics_trials, write, out or Path("runs", study.study), quiet)
 
 
@@ -139,7 +141,8 @@ def id_command(
         content = dynamics_content(trials, tables, strengths) if as_json else None
         return _Findings(warnings, shown, changed, content)
 
-    study = load_inverse_dynamics(config, changes)
+    with meant_as("inverse-dynamics", config):
+        study = load_inverse_dynamics(config, changes)
     if update_patient:
         require_own_patient(load_patient(study.patient))
     _study(study, dynamics_trials, write, out or Path("runs", study.study), quiet)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from pathwalker_cli.commands.json_output import print_json
+from pathwalker_cli.commands.kinds import meant_as
 from pathwalker_cli.commands.neighbour_study import base_of, study_options
 
 __all__ = ["sensitivity_command"]
@@ -39,7 +40,8 @@ def sensitivity_command(
         write_sensitivities,
     )
 
-    study = load_study(config, SensitivityStudy, changes)
+    with meant_as("sensitivity", config):
+        study = load_study(config, SensitivityStudy, changes)
     check_folder(out, frozenset({"base", "points", "figures", *FILES}), "sensitivity")
     result = sensitivities(study, base_of(study, run, out, quiet), out)
     write_sensitivities(result, out)

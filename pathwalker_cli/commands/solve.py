@@ -14,6 +14,7 @@ from pathwalker_cli.commands.complete import (
     set_option,
 )
 from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.kinds import meant_as
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -87,17 +88,12 @@ def _study(
 ) -> tuple[StudyConfig, Patient]:
     """Return the config with all overrides, and its patient."""
     from pathwalker_cli.config import load_config, smoke_version, study_patient
-    from pathwalker_cli.errors import ConfigError, PatientError
+    from pathwalker_cli.errors import PatientError
     from pathwalker_cli.problems import problem_named
 
     problem_named(problem)
-    try:
+    with meant_as("prediction", path):
         study = load_config(path, problem, changes)
-    except ConfigError:
-        from pathwalker_cli.checking.kinds import meant_as_prediction
-
-        with meant_as_prediction(path):
-            raise
     try:
         patient = study_patient(study)
     except PatientError as error:

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from pathwalker_cli.commands.json_output import print_json
+from pathwalker_cli.commands.kinds import meant_as
 from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
 
 __all__ = ["tradeoff_command"]
@@ -36,7 +37,8 @@ def tradeoff_command(
     from pathwalker_cli.studies.tradeoff.study import TradeoffStudy, tradeoff_of
     from pathwalker_cli.studies.tradeoff.text import tradeoff_lines
 
-    study = load_study(config, TradeoffStudy, changes)
+    with meant_as("tradeoff", config):
+        study = load_study(config, TradeoffStudy, changes)
     check_folder(out, ENTRIES, "tradeoff")
     base = base_of(study, run, out, quiet)
     tradeoff = tradeoff_of(study, base, out, teller(quiet), Progress(quiet=True))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from pathwalker_cli.commands.json_output import print_json
+from pathwalker_cli.commands.kinds import meant_as
 from pathwalker_cli.commands.neighbour_study import study_options, teller
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ def uncertainty_command(
         write_uncertainty,
     )
 
-    study = load_study(config, UncertaintyStudy, changes)
+    with meant_as("uncertainty", config):
+        study = load_study(config, UncertaintyStudy, changes)
     check_folder(out, ENTRIES, "uncertainty")
     base = base_with_springs(study, run, out, quiet)
     count = workers or len(os.sched_getaffinity(0))
