@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from helpers import stylised_series, walker_of
 from pathwalker_cli.config import load_config, with_values
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.ocp import mesh as meshing
@@ -16,7 +17,6 @@ from pathwalker_cli.ocp.shortfall import MissingTorque, Shortfall, missing_torqu
 from pathwalker_cli.ocp.solution import TOO_WEAK, GaitSolution
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.output.solve_text import failure_text, shortfall_text
-from tests.helpers import stylised_series, walker_of
 
 
 def test_help_counts_for_the_muscle_that_pulls_its_way_and_small_help_does_not() -> None:
