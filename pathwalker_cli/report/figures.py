@@ -19,7 +19,7 @@ from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_ha
 from pathwalker_cli.evaluation.traces import Trace, lone_trace, traces
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.output.figures.inline import inline_svg
-from pathwalker_cli.output.figures.style import COLUMN, STYLE, legend, new_figure
+from pathwalker_cli.output.figures.style import STYLE, legend, new_figure
 from pathwalker_cli.output.recorded_figures import joint_torque_figure, name_figure
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
@@ -90,8 +90,8 @@ def _legend(shown: Sequence[Trace]) -> Drawing:
     handles = legend_handles(shown)
 
     def draw() -> Figure:
-        figure = new_figure(COLUMN, 0.17 * ((len(handles) + 1) // 2) + 0.06)
-        legend(figure, handles, columns=2)
+        figure = new_figure(0.17 * ((len(handles) + 1) // 2) + 0.06)
+        legend(figure, handles)
         return figure
 
     return _drawn(draw, "legend", "Legend of the curves")
