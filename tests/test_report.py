@@ -9,8 +9,10 @@ import xml.etree.ElementTree as ET
 from collections import Counter
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 from click.testing import CliRunner, Result
 
 from conftest import MadeSolution
@@ -277,6 +279,7 @@ def test_a_changed_patient_and_a_quick_check_are_told(
     config = made_solution().config.model_copy(update={"smoke": True})
     folder = write_made_run(tmp_path / "run", made_solution, "mapd-orthosis", config=config)
     metrics = json.loads((folder / "metrics.json").read_text())
+    (folder / "patient.yaml").unlink()
     metrics["input_hashes"]["patient"] = "0" * 64
     metrics["reintegration_velocity_error"] = 0.02
     (folder / "metrics.json").write_text(json.dumps(metrics))
@@ -287,6 +290,39 @@ def test_a_changed_patient_and_a_quick_check_are_told(
     assert (
         page_of([write_made_run(tmp_path / "fine", made_solution, "mapd-orthosis")]).warnings == ()
     )
+
+
+@pytest.mark.usefixtures("no_curves")
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"orthosis": {"mass": {"shank": 0.4, "foot": 0.7}}}, {"mapd-orthosis"}),
+        ({"orthosis": None}, {"mapd-orthosis"}),
+        ({"description": "another word"}, set()),
+        ({"body_mass": 25.5}, {"mapd-barefoot", "mapd-orthosis"}),
+        ({"recorded": None}, {"mapd-barefoot", "mapd-orthosis"}),
+    ],
+)
+def test_a_changed_patient_is_told_where_it_matters(
+    made_solution: MadeSolution, tmp_path: Path, changes: dict[str, Any], told: set[str]
+) -> None:
+    content = load_patient("sreenivasa2017-patient").model_dump(mode="json", exclude_none=True)
+    file = tmp_path / "patient.yaml"
+    file.write_text(yaml.safe_dump(content))
+    found = {}
+    for problem in ("mapd-barefoot", "mapd-orthosis"):
+        config = made_solution(problem).config.model_copy(update={"patient": str(file)})
+        folder = write_made_run(tmp_path / problem, made_solution, problem, config=config)
+        (found[problem],) = read_runs([folder])
+    for key, value in changes.items():
+        if value is None:
+            del content[key]
+        elif isinstance(value, dict):
+            content[key] |= value
+        else:
+            content[key] = value
+    file.write_text(yaml.safe_dump(content))
+    assert {name for name, run in found.items() if run.patient_changed} == told
 
 
 @pytest.mark.usefixtures("no_curves")
