@@ -7,6 +7,7 @@ import re
 import shutil
 import xml.etree.ElementTree as ET
 from collections import Counter
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -230,6 +231,32 @@ def test_without_a_verdict_the_page_says_so(made_solution: MadeSolution, tmp_pat
     assert {row.cells[7] for row in found.tables[0].rows} == {"not judged"}
     assert found.tables[0].rows[0].cells[2] == "50.0"
     assert gait_page([run]).answer.startswith("Springs found: K_D 50.0 N m/rad right")
+
+
+@pytest.mark.usefixtures("no_curves")
+@pytest.mark.parametrize("judged", [True, False])
+def test_prescribed_springs_are_said_to_be_prescribed(
+    made_solution: MadeSolution, tmp_path: Path, judged: bool
+) -> None:
+    folder = write_made_run(tmp_path / "run", made_solution, "mapd-orthosis")
+    metrics = json.loads((folder / "metrics.json").read_text())
+    metrics["stiffness_ranges"] = {name: [50.0, 50.0] for name in STIFFNESSES}
+    metrics["verdict"] = None
+    if judged:
+        springs = tuple(
+            replace(spring, range=(50.0, 50.0), limit="upper") for spring in made_verdict().springs
+        )
+        metrics["verdict"] = made_verdict(springs=springs, snapped=None).as_dict()
+    (folder / "metrics.json").write_text(json.dumps(metrics))
+    (run,) = read_runs([folder])
+    table = spring_section(run).tables[0]
+    assert {row.cells[-1] for row in table.rows} == {"prescribed by the config, not identified"}
+    assert {row.cells[5] for row in table.rows} == {"-"}
+    assert gait_page([run]).answer.startswith("Springs worn: K_D 50.0 N m/rad (prescribed) right")
+    if not judged:
+        assert spring_section(run).lines == (
+            "The config prescribes all springs: nothing was identified.",
+        )
 
 
 def test_a_verdict_comes_back_from_the_metrics() -> None:

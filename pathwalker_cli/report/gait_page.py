@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pathwalker_cli.conventions import SIDES, to_degrees
+from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
 from pathwalker_cli.evaluation.evaluate import Change
 from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.report.assumptions import assumption_section
@@ -13,7 +13,7 @@ from pathwalker_cli.report.figures import curve_section
 from pathwalker_cli.report.folders import Study
 from pathwalker_cli.report.gait_table import gait_section
 from pathwalker_cli.report.runs import ReportRun, changes_of
-from pathwalker_cli.report.springs import recommended, spring_section
+from pathwalker_cli.report.springs import prescribed, recommended, spring_section
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.studies.measures import measure_of
 
@@ -74,13 +74,16 @@ def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
         saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot ({share:+.0f} %)"
     real = run.verdict is not None and run.verdict.snapped is not None
     kind = "Springs to take" if real else "Springs found"
+    if all(prescribed(run, name) for name in STIFFNESSES):
+        kind = "Springs worn"
     return f"{kind}: {_springs(run)}; predicted gait walks {gait}{saved}."
 
 
 def _springs(run: ReportRun) -> str:
     """Return the springs with how sure they are, sides that agree together."""
     stiffness, verdict = recommended(run), run.verdict
-    sure = {s.spring: s.determined for s in verdict.springs} if verdict else {}
+    sure = {name: "prescribed" for name in STIFFNESSES if prescribed(run, name)}
+    sure |= {s.spring: s.determined for s in verdict.springs} if verdict else {}
     parts: dict[str, list[str]] = {}
     for name, value in stiffness.items():
         kind, _, side = measure_of(name).label.rpartition(" ")
