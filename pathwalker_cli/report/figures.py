@@ -21,10 +21,23 @@ from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.output.figures.inline import inline_svg
 from pathwalker_cli.output.figures.style import STYLE, legend, new_figure
 from pathwalker_cli.output.recorded_figures import joint_torque_figure, name_figure
+from pathwalker_cli.patient_blocks import SpringSet
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
+from pathwalker_cli.report.study_files import Spreads
+from pathwalker_cli.studies.landscape.figures import Chosen, cost_figure
+from pathwalker_cli.studies.landscape.result import Landscape
+from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure
+from pathwalker_cli.studies.tradeoff.result import Tradeoff
+from pathwalker_cli.studies.uncertainty.figures import spread_figure
 
-__all__ = ["curve_section", "torque_drawing"]
+__all__ = [
+    "curve_section",
+    "landscape_drawing",
+    "spread_drawing",
+    "torque_drawing",
+    "tradeoff_drawing",
+]
 
 
 def curve_section(runs: Sequence[ReportRun]) -> Section:
@@ -68,6 +81,33 @@ def torque_drawing(
         return figure
 
     return _drawn(draw, name, title, "wide")
+
+
+def landscape_drawing(landscape: Landscape, springs: SpringSet | None, chosen: Chosen) -> Drawing:
+    """Return the cost over the springs of a side.
+
+    Args:
+        landscape: The landscape.
+        springs: Springs that exist, or None.
+        chosen: K_D and K_P of the springs to take by side [N m/rad].
+    """
+    title = "Cost above the least [%] over K_D and K_P [N m/rad]"
+    return _drawn(lambda: cost_figure(landscape, springs, chosen), "landscape", title, "tall")
+
+
+def tradeoff_drawing(tradeoff: Tradeoff) -> Drawing:
+    """Return effort over speed, and the springs along the front."""
+    title = "Effort per distance [s/m] and springs [N m/rad] over walking speed [m/s]"
+    return _drawn(lambda: tradeoff_figure(tradeoff), "tradeoff", title, "tall")
+
+
+def spread_drawing(found: Spreads) -> Drawing:
+    """Return where springs, cost and gait of all draws end up."""
+    title = "Springs of all draws [N m/rad], and deviation of cost and gait from the base [%]"
+    return _drawn(
+        lambda: spread_figure(found.values, found.ranges, found.spreads),
+        "uncertainty", title, "tall",
+    )  # fmt: skip
 
 
 def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:

@@ -31,7 +31,7 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
     worn = [run for run in runs if run.worn]
     sections = [spring_section(run) for run in worn]
     sections += [gait_section(runs, changes), curve_section(runs)]
-    sections += [study_section(study) for study in studies]
+    sections += [study_section(study, _base(study, runs)) for study in studies]
     sections.append(assumption_section(runs))
     facts = (
         Fact("Patient", patient.id),
@@ -42,6 +42,11 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
     )
     answer = " ".join(_answer(run, changes) for run in worn or runs)
     return Page(f"Gait of {patient.id}", facts, answer, tuple(_warnings(runs)), tuple(sections))
+
+
+def _base(study: Study, runs: Sequence[ReportRun]) -> ReportRun:
+    """Return the run that a study stands on."""
+    return next((run for run in runs if study.stands_on(run.run.metrics)), runs[-1])
 
 
 def _of_runs(runs: Sequence[ReportRun]) -> list[Fact]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from textwrap import fill
 from typing import Any, Final
@@ -15,14 +16,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
-from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.output.figures.save import save_formats
-from pathwalker_cli.output.figures.style import STYLE, legend_panel, new_figure
+from pathwalker_cli.output.figures.style import STYLE, legend, legend_panel, new_figure
+from pathwalker_cli.patient_blocks import SpringSet
 from pathwalker_cli.studies.landscape.result import Landscape
 from pathwalker_cli.studies.measures import measure_of
 
-__all__ = ["landscape_figure", "save_landscape_figure"]
+__all__ = ["Chosen", "cost_figure", "landscape_figure", "save_landscape_figure"]
+
+Chosen = Mapping[Side, tuple[float, float]]
+"""K_D and K_P by side [N m/rad]."""
 
 _LEVELS: Final = (0.0, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0)
 """Limits of the colours [%]; what is above belongs to the last one."""
@@ -59,6 +64,42 @@ def landscape_figure(landscape: Landscape) -> Figure:
             artist.set_in_layout(False)  # marks on the edge would push all axes away from it
         legend_panel(panels["legend"], _handles(landscape))
     return fig
+
+
+def cost_figure(landscape: Landscape, springs: SpringSet | None, chosen: Chosen) -> Figure:
+    """Return the cost alone, with the springs that can be bought at the edges of the plane.
+
+    Args:
+        landscape: The landscape.
+        springs: Springs that exist, or None.
+        chosen: K_D and K_P of the real springs to take by side [N m/rad]; empty if nothing chose.
+    """
+    with mpl.rc_context(STYLE):
+        fig = new_figure(3.5)
+        ax = fig.subplots()
+        _draw_cost(fig, ax, landscape)
+        handles = _handles(landscape)
+        if springs is not None:
+            _mark_real(ax, springs)
+            handles.append(Line2D([], [], linestyle="none", label="real springs", **_REAL_D))
+        for k_d, k_p in chosen.values():
+            ax.plot(k_d, k_p, linestyle="none", clip_on=False, zorder=6, **_SQUARE)
+        if chosen:
+            handles.append(Line2D([], [], linestyle="none", label="to take", **_SQUARE))
+        for artist in (*ax.lines, *ax.collections):
+            artist.set_in_layout(False)
+        legend(fig, handles)
+    return fig
+
+
+def _mark_real(ax: Axes, springs: SpringSet) -> None:
+    """Mark the springs that exist: K_D at the upper edge, K_P at the right one."""
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    look: dict[str, Any] = {"linestyle": "none", "clip_on": False, "zorder": 4}
+    k_d = [s.stiffness for s in springs.dorsiflexion if left <= s.stiffness <= right]
+    k_p = [s.stiffness for s in springs.plantarflexion if low <= s.stiffness <= high]
+    ax.plot(k_d, [high] * len(k_d), **_REAL_D, **look)
+    ax.plot([right] * len(k_p), k_p, **_REAL_P, **look)
 
 
 def save_landscape_figure(folder: Path, landscape: Landscape) -> None:
@@ -140,7 +181,7 @@ def _plane(ax: Axes, landscape: Landscape, small: bool = False) -> None:
     ):
         logarithmic = values[0] > 0.0 and values[-1] / values[0] >= _LOGARITHMIC
         set_scale("log" if logarithmic else "linear")
-        ticks = values[[0, values.size // 2, -1]] if small else values
+        ticks = np.unique(values[[0, values.size // 2, -1]]) if small else values
         axis.set_major_locator(FixedLocator(ticks.tolist()))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
@@ -164,6 +205,15 @@ _CROSS: Final[dict[str, Any]] = {
     "markersize": 6.0,
     "markeredgewidth": 1.5,
 }
+_REAL_D: Final[dict[str, Any]] = {
+    "marker": 7, "color": "#009E73", "markersize": 6.0, "markeredgecolor": "black",
+    "markeredgewidth": 0.5,
+}  # fmt: skip
+_REAL_P: Final[dict[str, Any]] = {**_REAL_D, "marker": 4}
+_SQUARE: Final[dict[str, Any]] = {
+    "marker": "s", "color": "#009E73", "markersize": 10.0, "fillstyle": "none",
+    "markeredgewidth": 1.6,
+}  # fmt: skip
 _STAR: Final[dict[str, Any]] = {
     "marker": "*", "color": "#D55E00", "markersize": 13.0, "markeredgecolor": "white",
 }  # fmt: skip

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any, Final
 
 import matplotlib as mpl
@@ -24,12 +26,16 @@ from pathwalker_cli.output.figures.style import (
     legend,
     new_figure,
 )
+from pathwalker_cli.studies.springs import Ranges
 from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
 
 __all__ = ["correlation_figure", "save_uncertainty_figures", "spread_figure"]
 
 _STRIP: Final = 0.22
 """Half the height over which points of a row are scattered, so that equal ones can be told."""
+
+_LABEL: Final = 20
+"""Characters of the longest line of the name of a row."""
 
 _SEED: Final = 0
 
@@ -42,35 +48,44 @@ def save_uncertainty_figures(result: Uncertainty, folder: Path) -> None:
     if not result.converged:
         return
     found = spreads(result)
-    save_formats(spread_figure(result, found), folder, "uncertainty")
+    values = {measure.key: result.values(measure.key) for measure in result.measures}
+    save_formats(spread_figure(values, result.ranges, found), folder, "uncertainty")
     save_formats(correlation_figure(result, found), folder, "correlations")
 
 
-def spread_figure(result: Uncertainty, found: list[Spread]) -> Figure:
-    """Return the springs of all draws in their ranges, and cost and gait around the base."""
-    springs = [spread for spread in found if spread.measure.key in result.ranges]
-    others = [spread for spread in found if spread.measure.key not in result.ranges]
+def spread_figure(
+    values: Mapping[str, np.ndarray], ranges: Ranges, found: Sequence[Spread]
+) -> Figure:
+    """Return the springs of all draws in their ranges, and cost and gait around the base.
+
+    Args:
+        values: Every measure of all converged draws, SI units, each of shape (n,).
+        ranges: Allowed range by spring [N m/rad].
+        found: How the measures spread.
+    """
+    springs = [spread for spread in found if spread.measure.key in ranges]
+    others = [spread for spread in found if spread.measure.key not in ranges]
     with mpl.rc_context(STYLE):
         rows = (len(springs) + 1, len(others))
         fig = new_figure(1.6 + 0.27 * sum(rows))
         left, right = fig.subplots(2, 1, height_ratios=rows)
         for y, spread in enumerate(springs):
-            low, high = result.ranges[spread.measure.key]
+            low, high = ranges[spread.measure.key]
             left.plot([low, high], [y, y], color="#cccccc", linewidth=7.0, solid_capstyle="butt")
-            _draw(left, y, result.values(spread.measure.key), spread, 1.0)
+            _draw(left, y, values[spread.measure.key], spread, 1.0)
             left.text(high, y - 0.3, _limits(spread), ha="right", va="bottom")
         _rows(left, [spread.measure.label for spread in springs], -0.95)
         dress(left, "Identified springs", "stiffness [N m/rad], logarithmic")
         _stiffness_axis(left)
         for y, spread in enumerate(others):
-            values = 100.0 * (result.values(spread.measure.key) / spread.base - 1.0)
-            _draw(right, y, values, spread, 100.0)
-        _rows(right, [spread.measure.label for spread in others], -0.6)
+            shares = 100.0 * (values[spread.measure.key] / spread.base - 1.0)
+            _draw(right, y, shares, spread, 100.0)
+        _rows(right, [fill(spread.measure.label, _LABEL) for spread in others], -0.6)
         right.axvline(0.0, color=NEUTRAL, linewidth=0.6)
         dress(right, "Cost and gait", "deviation from the base [%]")
         for ax in (left, right):
             ax.grid(visible=False, axis="y")
-        legend(fig, _handles(len(result.converged)))
+        legend(fig, _handles(len(values[found[0].measure.key])))
         return fig
 
 
@@ -108,7 +123,7 @@ def _limits(spread: Spread) -> str:
     """Return how often a spring sits at a limit."""
     if spread.lower is None or spread.upper is None:
         return "prescribed"
-    return f"at lower limit {100.0 * spread.lower:.0f} %, at upper {100.0 * spread.upper:.0f} %"
+    return f"softest {100.0 * spread.lower:.0f} %, stiffest {100.0 * spread.upper:.0f} %"
 
 
 def _rows(ax: Axes, labels: list[str], top: float) -> None:
@@ -171,9 +186,5 @@ def _input(place: str) -> str:
     group, _, name = place.partition(".")
     if group == "recorded":
         name = name.partition(".")[2].replace("joint_ranges.", "range of ")
-    return (
-        (name or group)
-        .replace("segment_lengths.", "length of ")
-        .replace("_", " ")
-        .replace(".", ", ")
-    )
+    words = {"segment_lengths": f"length of {name}"}.get(group, name or group)
+    return words.replace("_", " ").replace(".", ", ")
