@@ -726,7 +726,7 @@ def test_recorded_gait_shows_stances_torques_and_strengths(recorded: Path, tmp_p
         ("barefoot", "left", "13", "14", "5"),
     ]
     (drawing,) = section(page, "Net joint torques").drawings
-    assert drawing.shape == "wide"
+    assert drawing.shape == "tall"
     assert "barefoot, 13 trials" in drawing.svg
     strengths = {row.cells[0]: row.cells for row in section(page, "Muscle").tables[0].rows}
     assert strengths["hip extension, right"][1:3] == ("27.2", "18.6")

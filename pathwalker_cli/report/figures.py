@@ -80,7 +80,7 @@ def torque_drawing(
         name_figure(figure, f"{trials[0].condition}, {len(trials)} trials")
         return figure
 
-    return _drawn(draw, name, title, "wide")
+    return _drawn(draw, name, title, "tall")
 
 
 def landscape_drawing(landscape: Landscape, springs: SpringSet | None, chosen: Chosen) -> Drawing:
