@@ -22,7 +22,7 @@ from pathwalker_cli.ocp.cost_terms import walked_distance
 from pathwalker_cli.ocp.ipopt import NlpResult
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.ocp.verify import reintegrate
-from pathwalker_cli.output.figures.style import NEUTRAL, PAGE, STYLE, new_figure
+from pathwalker_cli.output.figures.style import NEUTRAL, STYLE, new_figure
 from pathwalker_cli.output.run_folder import load_run
 
 DOCS: Final = Path(__file__).parents[1] / "docs"
@@ -106,8 +106,8 @@ def draw(points: list[Point]) -> None:
     """Draw cost and errors over the number of intervals."""
     finest = max(points, key=lambda p: (p.degree, p.intervals))
     with rc_context(STYLE):
-        figure = new_figure(PAGE, 2.6)
-        left, right = figure.subplots(1, 2)
+        figure = new_figure(4.2)
+        left, right = figure.subplots(2, 1)
         for degree, marker, line in zip(DEGREES, "os", ("--", "-"), strict=True):
             chosen = sorted((p for p in points if p.degree == degree), key=lambda p: p.intervals)
             counts = [p.intervals for p in chosen]
@@ -121,11 +121,13 @@ def draw(points: list[Point]) -> None:
         left.set_xscale("log", base=2)
         left.set_ylabel("cost above the finest mesh [%]")
         right.set_ylabel("re-integration error of q [rad, m]")
+        right.yaxis.set_major_formatter("{x:.0e}")
+        right.set_ylim(bottom=1e-11)  # room for the legend
         for axes in (left, right):
             axes.set_xlabel("mesh intervals")
             axes.set_xticks(INTERVALS, [str(k) for k in INTERVALS])
             axes.minorticks_off()
-            axes.legend(frameon=False)
+            axes.legend(frameon=False, loc="best" if axes is left else "lower left")
         figure.savefig(DOCS / "images" / "convergence.png", dpi=200)
 
 

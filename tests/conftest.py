@@ -13,7 +13,9 @@ os.environ["MPLBACKEND"] = "Agg"
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from matplotlib.figure import Figure
 
+from figure_measure import complaints
 from helpers import stylised_series, walker_of
 from pathwalker_cli.config import load_config
 from pathwalker_cli.ocp.gait_bounds import gait_bounds
@@ -61,6 +63,23 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         base = tmp_path_factory.getbasetemp()
         shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
         patch.setenv("PATHWALKER_CACHE", str(shared / "cache"))
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _legible_figures() -> Iterator[None]:
+    """Let no figure be saved whose text cannot be read when it is printed as wide as a column."""
+    save = Figure.savefig
+
+    def checked(self: Figure, *words: Any, **options: Any) -> Any:
+        result = save(self, *words, **options)
+        if options.get("format") == "svg":  # frames of films are for screens
+            found = complaints(self)
+            assert not found, found
+        return result
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", checked)
         yield
 
 

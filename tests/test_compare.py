@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
@@ -13,12 +15,15 @@ from click.testing import CliRunner, Result
 from conftest import MadeSolution
 from pathwalker_cli.cli import cli
 from pathwalker_cli.evaluation import figures
+from pathwalker_cli.evaluation.quantities import quantity_of
 from pathwalker_cli.evaluation.run import gaits_of_runs
+from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.evaluation.traces import lone_trace, traces
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.verify import ActiveBound
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report.compare import Compared, compare_runs
+from pathwalker_cli.report.compare_text import comparison_lines
 from report_runs import write_made_run
 
 CHILD = Path(__file__).parent / "data" / "child-10y" / "patient.yaml"
@@ -130,6 +135,71 @@ def test_files_and_figures(runs: Path, tmp_path: Path) -> None:
     assert float(rows["cost"]["child - mapd-barefoot"]) == pytest.approx(0.1)
     assert float(rows["cost"]["child - mapd-barefoot [%]"]) == pytest.approx(25.0)
     assert rows["dorsiflexion_stiffness_left"]["mapd-barefoot"] == ""
+
+
+def test_goals_are_compared(runs: Path) -> None:
+    found = compare_runs([runs / "mapd-barefoot", runs / "child"])
+    rows = {row.quantity.key: row for row in found.rows}
+    told = [
+        json.loads((runs / name / "metrics.json").read_text())["goals"]
+        for name in ("mapd-barefoot", "child")
+    ]
+    assert rows["goals.crouch"].values == tuple(goals["crouch"] for goals in told)
+    output = compare(runs / "mapd-barefoot", runs / "child").output
+    assert re.search(r"^ crouch +[0-9.]+ .* rad\^2$", output, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("changes", "alone"),
+    [
+        ({"goals": {"crouch": 0.5}}, {"cost"}),
+        ({"walking_speed_weight": 1.0}, {"cost"}),
+        ({"activation_power": 3}, {"cost", "effort_per_distance"}),
+    ],
+)
+def test_what_means_something_else_has_no_difference(
+    made_solution: MadeSolution, runs: Path, tmp_path: Path, changes: dict[str, Any],
+    alone: set[str],
+) -> None:  # fmt: skip
+    config = made_solution().config
+    cost = config.cost.model_copy(update=changes)
+    other = write_made_run(
+        tmp_path / "other", made_solution, "mapd-orthosis",
+        config=config.model_copy(update={"cost": cost}), cost=0.5,
+    )  # fmt: skip
+    found = compare_runs([runs / "mapd-orthosis", other])
+    silent = {
+        row.quantity.key
+        for row in found.rows
+        if None not in row.values and row.differences[1] is None
+    }
+    assert silent == alone
+    assert "costs of different weights or goals cannot be compared" in found.notes
+    line = next(
+        line for line in "\n".join(comparison_lines(found)).split("\n") if line[:5] == " cost"
+    )
+    assert line.split() == ["cost", "0.400", "0.500", "-", "-"]
+
+
+def test_fits_and_predictions_have_other_costs(
+    made_solution: MadeSolution, runs: Path, tmp_path: Path
+) -> None:
+    fit = write_made_run(tmp_path / "fit", made_solution, "ls-barefoot")
+    (cost,) = (
+        r for r in compare_runs([runs / "mapd-barefoot", fit]).rows if r.quantity.key == "cost"
+    )
+    assert cost.differences[1] is None
+
+
+def test_words_for_people(made_solution: MadeSolution, runs: Path, tmp_path: Path) -> None:
+    config = made_solution().config.model_copy(update={"verdict": False})
+    other = write_made_run(tmp_path / "other", made_solution, "mapd-orthosis", config=config)
+    output = compare(runs / "mapd-orthosis", other).output
+    assert " verdict: yes (mapd-orthosis), no (other)" in output
+    assert "-0.0 " not in output
+    quantity = quantity_of("step_length_left")
+    assert number_text(-1e-9, quantity, sign=True) == "+0.000"
+    assert number_text(-0.001, quantity) == "-0.001"
 
 
 @pytest.mark.usefixtures("no_figures")

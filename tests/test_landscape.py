@@ -254,7 +254,8 @@ def test_the_figure_marks_what_is_there(made: Make) -> None:
     landscape, _ = made(leaps=True)
 
     def entries(shown: Landscape) -> list[str]:
-        return [text.get_text() for text in landscape_figure(shown).legends[0].get_texts()]
+        box = landscape_figure(shown).axes[4].get_legend()
+        return [text.get_text().replace("\n", " ") for text in box.get_texts()]
 
     assert entries(landscape) == [
         "at most 5 % above the least", "least cost found", "identified in the article", "solved",

@@ -349,9 +349,9 @@ def test_figure_shows_only_measured_strides() -> None:
     study = load_inverse_dynamics("inverse-dynamics", ("conditions=[barefoot]",))
     trials = dynamics_trials(study, load_patient(PATIENT), lambda name: None)
     figure = joint_torque_figure(trials, 24.7)
-    labels = [entry.get_text() for entry in figure.legends[0].get_texts()]
-    assert labels[:2] == ["right, mean of 4 measured strides", "left, mean of 5 measured strides"]
-    assert [ax.get_ylabel() for ax in figure.axes] == ["internal net torque [N m/kg]"] * 3
+    labels = [entry.get_text() for entry in figure.axes[-1].get_legend().get_texts()]
+    assert labels[:2] == ["right, mean of\n4 measured strides", "left, mean of\n5 measured strides"]
+    assert [ax.get_ylabel() for ax in figure.axes[:3]] == ["net torque\n[N m/kg]"] * 3
 
 
 def test_trials_without_forces_get_figures_of_angles_only(tmp_path: Path) -> None:

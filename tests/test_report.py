@@ -7,14 +7,19 @@ import re
 import shutil
 import xml.etree.ElementTree as ET
 from collections import Counter
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+import yaml
 from click.testing import CliRunner, Result
 
 from conftest import MadeSolution
 from pathwalker_cli.cli import cli
+from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.inverse.study import load_inverse_dynamics
@@ -27,6 +32,15 @@ from pathwalker_cli.report.gait_page import gait_page
 from pathwalker_cli.report.html import page_html
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.springs import recommended, spring_section, verdict_words
+from pathwalker_cli.studies.landscape.files import write_landscape
+from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
+from pathwalker_cli.studies.measures import MEASURES
+from pathwalker_cli.studies.pool import Solved
+from pathwalker_cli.studies.tradeoff.files import write_tradeoff
+from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
+from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input
+from pathwalker_cli.studies.uncertainty.result import Uncertainty
+from pathwalker_cli.studies.uncertainty.text import write_uncertainty
 from pathwalker_cli.studies.verdict import verdict_of_metrics
 from report_runs import HOSTILE, made_verdict, write_made_run
 
@@ -230,6 +244,32 @@ def test_without_a_verdict_the_page_says_so(made_solution: MadeSolution, tmp_pat
     assert gait_page([run]).answer.startswith("Springs found: K_D 50.0 N m/rad right")
 
 
+@pytest.mark.usefixtures("no_curves")
+@pytest.mark.parametrize("judged", [True, False])
+def test_prescribed_springs_are_said_to_be_prescribed(
+    made_solution: MadeSolution, tmp_path: Path, judged: bool
+) -> None:
+    folder = write_made_run(tmp_path / "run", made_solution, "mapd-orthosis")
+    metrics = json.loads((folder / "metrics.json").read_text())
+    metrics["stiffness_ranges"] = {name: [50.0, 50.0] for name in STIFFNESSES}
+    metrics["verdict"] = None
+    if judged:
+        springs = tuple(
+            replace(spring, range=(50.0, 50.0), limit="upper") for spring in made_verdict().springs
+        )
+        metrics["verdict"] = made_verdict(springs=springs, snapped=None).as_dict()
+    (folder / "metrics.json").write_text(json.dumps(metrics))
+    (run,) = read_runs([folder])
+    table = spring_section(run).tables[0]
+    assert {row.cells[-1] for row in table.rows} == {"prescribed by the config, not identified"}
+    assert {row.cells[5] for row in table.rows} == {"-"}
+    assert gait_page([run]).answer.startswith("Springs worn: K_D 50.0 N m/rad (prescribed) right")
+    if not judged:
+        assert spring_section(run).lines == (
+            "The config prescribes all springs: nothing was identified.",
+        )
+
+
 def test_a_verdict_comes_back_from_the_metrics() -> None:
     verdict = made_verdict()
     plain = json.loads(json.dumps(verdict.as_dict()))
@@ -277,6 +317,7 @@ def test_a_changed_patient_and_a_quick_check_are_told(
     config = made_solution().config.model_copy(update={"smoke": True})
     folder = write_made_run(tmp_path / "run", made_solution, "mapd-orthosis", config=config)
     metrics = json.loads((folder / "metrics.json").read_text())
+    (folder / "patient.yaml").unlink()
     metrics["input_hashes"]["patient"] = "0" * 64
     metrics["reintegration_velocity_error"] = 0.02
     (folder / "metrics.json").write_text(json.dumps(metrics))
@@ -287,6 +328,39 @@ def test_a_changed_patient_and_a_quick_check_are_told(
     assert (
         page_of([write_made_run(tmp_path / "fine", made_solution, "mapd-orthosis")]).warnings == ()
     )
+
+
+@pytest.mark.usefixtures("no_curves")
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"orthosis": {"mass": {"shank": 0.4, "foot": 0.7}}}, {"mapd-orthosis"}),
+        ({"orthosis": None}, {"mapd-orthosis"}),
+        ({"description": "another word"}, set()),
+        ({"body_mass": 25.5}, {"mapd-barefoot", "mapd-orthosis"}),
+        ({"recorded": None}, {"mapd-barefoot", "mapd-orthosis"}),
+    ],
+)
+def test_a_changed_patient_is_told_where_it_matters(
+    made_solution: MadeSolution, tmp_path: Path, changes: dict[str, Any], told: set[str]
+) -> None:
+    content = load_patient("sreenivasa2017-patient").model_dump(mode="json", exclude_none=True)
+    file = tmp_path / "patient.yaml"
+    file.write_text(yaml.safe_dump(content))
+    found = {}
+    for problem in ("mapd-barefoot", "mapd-orthosis"):
+        config = made_solution(problem).config.model_copy(update={"patient": str(file)})
+        folder = write_made_run(tmp_path / problem, made_solution, problem, config=config)
+        (found[problem],) = read_runs([folder])
+    for key, value in changes.items():
+        if value is None:
+            del content[key]
+        elif isinstance(value, dict):
+            content[key] |= value
+        else:
+            content[key] = value
+    file.write_text(yaml.safe_dump(content))
+    assert {name for name, run in found.items() if run.patient_changed} == told
 
 
 @pytest.mark.usefixtures("no_curves")
@@ -395,7 +469,7 @@ def test_runs_of_different_patients_are_refused(
 
 
 def write_studies(folder: Path, run: Path, note: str = "") -> None:
-    """Write the summaries of three studies around a run beside it."""
+    """Write studies of every kind around a run beside it."""
     metrics = json.loads((run / "metrics.json").read_text())
     base = {key: metrics[key] for key in ("problem", "patient")}
     optimum = {key: metrics[key] for key in ("cost", "walking_speed", *STIFFNESSES)}
@@ -408,24 +482,72 @@ def write_studies(folder: Path, run: Path, note: str = "") -> None:
         "body_mass": {"cost": 1.5, "walking_speed": 0.0, "stride_time": None},
         "segment_lengths.head": {"cost": 1e-9, "walking_speed": 0.0},
     }
-    point = {"dorsiflexion_stiffness": 92.0, "plantarflexion_stiffness": 5.0, "measures": optimum}
     contents = {
         "perturb/perturbation.json": base | {"optimum": optimum, "rows": [row, failed]},
         "sensitivity/sensitivity.json": base | {"optimum": optimum, "elasticities": elasticities},
-        "landscape/landscape.json": base | {
-            "start": point, "best": point, "side": "right", "tolerance": 0.05,
-            "dorsiflexion_stiffness": [5.0, 92.0], "plantarflexion_stiffness": [5.0],
-            "region": {"dorsiflexion_stiffness": [60.0, 92.0],
-                       "plantarflexion_stiffness": [5.0, 5.0], "share_of_points": 0.5},
-        },
     }  # fmt: skip
     for name, content in contents.items():
         (folder / name).parent.mkdir(parents=True)
         (folder / name).write_text(json.dumps(content))
-    (folder / "landscape" / "landscape.csv").write_text(
-        "point,dorsiflexion_stiffness [N m/rad],plantarflexion_stiffness [N m/rad],branch,status,"
-        "cost_increase [1]\na,5,5,1,converged,0.148\nb,92,5,1,converged,0\nb,92,5,2,converged,0.3\n"
+    numbers = {measure.key: float(metrics[measure.key]) for measure in MEASURES}
+    write_landscape(folder / "landscape", made_landscape(metrics, numbers))
+    write_tradeoff(folder / "tradeoff", made_tradeoff(metrics, numbers))
+    result = made_uncertainty(metrics, numbers)
+    (folder / "uncertainty").mkdir()
+    write_uncertainty(result, folder / "uncertainty")
+
+
+def made_landscape(metrics: dict[str, Any], numbers: dict[str, float]) -> Landscape:
+    """Return a landscape of four points, one with two local optima and one without a solution."""
+    ends = np.array([5.0, 92.0])
+
+    def point(name: str, k_d: float, k_p: float, branch: int, share: float) -> Point:
+        measures = {**numbers, "cost": numbers["cost"] * (1.0 + share)} if branch else {}
+        return Point(name, k_d, k_p, branch, "converged" if branch else "failed", 1, 0.1, measures)
+
+    best = point(ROOT, 91.7, 5.0, 1, 0.0)
+    points = (
+        best, point("d1-p1", 5.0, 5.0, 1, 0.148), point("d2-p1", 92.0, 5.0, 1, 0.002),
+        point("d2-p1", 92.0, 5.0, 2, 0.3), point("d1-p2", 5.0, 92.0, 1, 0.2),
+        point("d2-p2", 92.0, 92.0, 0, 0.0),
+    )  # fmt: skip
+    return Landscape(
+        metrics["patient"], metrics["problem"], "right", ends, ends, points, best, None, {},
+        (1e-3, 1e-2), 0.05, 5, 1, (12,), 3.0, 2, True,
+    )  # fmt: skip
+
+
+def made_tradeoff(metrics: dict[str, Any], numbers: dict[str, float]) -> Tradeoff:
+    """Return a trade-off of a front of two points, one that is dominated and one that failed."""
+
+    def point(weight: float, speed: float, effort: float, mesh: str = "base") -> FrontPoint:
+        measures = {**numbers, "walking_speed": speed, "effort_per_distance": effort}
+        return FrontPoint(f"w{weight:g}", weight, "converged", mesh, measures, (1e-4, 1e-3), 90,
+                          0.2, 1, 12)  # fmt: skip
+
+    failed = replace(point(3.0, 0.0, 0.0), status="failed", measures={}, errors=(np.nan, np.nan))
+    points = (point(0.0, 0.6, 0.25), point(1.0, 0.9, 0.4), point(2.0, 0.8, 0.5, "inaccurate"))
+    return Tradeoff(
+        metrics["patient"], metrics["problem"], "orthosis", (*points, failed), 0.0, numbers,
+        (0.7, 0.9), (1e-3, 1e-2), 9, 1, (12,), 3.0, 1.0, 2, True,
+    )  # fmt: skip
+
+
+def made_uncertainty(metrics: dict[str, Any], numbers: dict[str, float]) -> Uncertainty:
+    """Return twenty draws: K_D right is stiffest in 15 of them, one draw fails."""
+    ranges = dict.fromkeys(STIFFNESSES, (5.0, 92.0)) | {STIFFNESSES[1]: (50.0, 50.0)}
+    found = [
+        {**numbers, "cost": 1.0 + i, STIFFNESSES[0]: 92.0 if i > 4 else 60.0} if i else {}
+        for i in range(20)
+    ]
+    solved = tuple(
+        Solved(f"draw-{i:05d}", "converged" if values else "failed", values, 12, 0.1, False)
+        for i, values in enumerate(found)
     )
+    factors = np.linspace(0.9, 1.1, 20)[:, None]
+    draws = Draws((Input("body_mass", Distribution(relative=0.1)),), factors)
+    config = load_config(metrics["problem"])
+    return Uncertainty(config, metrics["patient"], 90, numbers, ranges, draws, solved, 3.0, 1)
 
 
 @pytest.mark.usefixtures("no_curves")
@@ -438,12 +560,61 @@ def test_studies_beside_a_run_add_their_tables(runs: Path) -> None:
     assert "no solution" in rows[1].cells
     (row,) = section(page, "Sensitivity").tables[0].rows
     assert row.cells == ("body mass", "1.500")
-    (row,) = section(page, "Landscape").tables[0].rows
-    assert row.cells == ("5", "14.8", "0.0*")
-    assert "K_D 60.0 to 92.0" in section(page, "Landscape").lines[1]
     assert HOSTILE in words_of(page)
     barefoot = page_of([runs / "mapd-barefoot"])
     assert not any(s.title.startswith("Sensitivity") for s in barefoot.sections)
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_maps_fronts_and_spreads_are_drawn(runs: Path) -> None:
+    write_studies(runs, runs / "mapd-orthosis")
+    page = page_of([runs / "mapd-orthosis"])
+    landscape = section(page, "Landscape")
+    assert landscape.lines[0] == "Least cost at K_D 91.7, K_P 5.0 N m/rad (right side)."
+    assert "K_D 63.4 to 92.0" in landscape.lines[1]
+    assert "20.0 % more than the best" in landscape.lines[2]
+    assert landscape.lines[3:] == (
+        "Several local optima at 1 of 4 points.", "No solution at 1 of 4 points.",
+    )  # fmt: skip
+    for words in ("least cost found", "real springs", "to take", "no solution", "best shown"):
+        assert words in landscape.drawings[0].svg
+    front = section(page, "Trade-off")
+    rows = front.tables[0].rows
+    assert [row.cells[0] for row in rows] == ["0", "1", "2", "3"]
+    assert rows[0].cells[1:3] == ("0.600", "0.250")
+    assert rows[2].cells[-1] == "dominated; mesh too coarse: rough numbers"
+    assert rows[3].mark == "failed"
+    assert "recorded speeds" in front.drawings[0].svg
+    spread = section(page, "Uncertainty")
+    cost = spread.tables[0].rows[0]
+    assert cost.cells[0] == "cost"
+    assert cost.cells[3:] == ("11.0000", "2.9000 to 19.1000", "body mass")
+    assert spread.lines[:3] == (
+        "20 draws of the uncertain numbers, 19 converged.",
+        "K_D right: least effort takes the stiffest (92 N m/rad) in 79 %, one between in 21 % of "
+        "the draws.",
+        "K_D left is prescribed: 50 N m/rad.",
+    )
+    assert "median, 90 % of draws" in spread.drawings[0].svg
+
+
+@pytest.mark.parametrize(
+    ("file", "wrong"),
+    [
+        ("landscape/landscape.json", {"dorsiflexion_stiffness": ["a"]}),
+        ("tradeoff/tradeoff.json", {"points": [{}]}),
+        ("uncertainty/uncertainty.json", {"spreads": {"cost": {}}}),
+    ],
+)
+@pytest.mark.usefixtures("no_curves")
+def test_broken_studies_are_refused(
+    runs: Path, tmp_path: Path, file: str, wrong: dict[str, Any]
+) -> None:
+    write_studies(tmp_path / "studies", runs / "mapd-orthosis")
+    path = tmp_path / "studies" / file
+    path.write_text(json.dumps(json.loads(path.read_text()) | wrong))
+    sentence = refusal(runs / "mapd-orthosis", path.parent, "-o", tmp_path / "page.html")
+    assert f"does not hold what `pathwalker {path.parent.name}` writes" in sentence
 
 
 @pytest.mark.usefixtures("no_curves")
@@ -555,7 +726,7 @@ def test_recorded_gait_shows_stances_torques_and_strengths(recorded: Path, tmp_p
         ("barefoot", "left", "13", "14", "5"),
     ]
     (drawing,) = section(page, "Net joint torques").drawings
-    assert drawing.shape == "wide"
+    assert drawing.shape == "tall"
     assert "barefoot, 13 trials" in drawing.svg
     strengths = {row.cells[0]: row.cells for row in section(page, "Muscle").tables[0].rows}
     assert strengths["hip extension, right"][1:3] == ("27.2", "18.6")

@@ -37,7 +37,11 @@ AT_LIMIT = SpringVerdict(
     "dorsiflexion_stiffness_left", 92.0, (5.0, 92.0), "upper", -2e-3, 1e-5, (60.0, 92.0),
     (False, True), True,
 )  # fmt: skip
-OPTIMUM = LocalOptimum(0, "synthetic", "converged", 0.25, 0.64, (20.0, 92.0), 10, 1.0)
+PRESCRIBED = SpringVerdict(
+    "dorsiflexion_stiffness_right", 40.0, (40.0, 40.0), "", 0.0, 0.0, (40.0, 40.0), (True, True),
+    True,
+)  # fmt: skip
+OPTIMUM = LocalOptimum(0, "synthetic", "converged", 0.25, 0.64, (40.0, 92.0, 20.0, 6.0), 10, 1.0)
 
 
 def verdict(**changes: object) -> Verdict:
@@ -75,6 +79,17 @@ def test_a_limit_says_what_lies_beyond_it() -> None:
     assert "sits at the lower limit: 0.5 N m/rad softer would save about 0.1 % more" in line
 
 
+def test_a_prescribed_spring_is_not_judged() -> None:
+    """Whatever else is known of it: it can sit at no limit."""
+    for spring in (PRESCRIBED, replace(PRESCRIBED, limit="upper", certain=False)):
+        line = text(verdict(springs=(spring, AT_LIMIT)))["K_D right"]
+        assert line == "40.0 N m/rad (0.70 N m/deg): prescribed by the config, not identified"
+    assert PRESCRIBED.determined == "prescribed"
+    others = replace(OPTIMUM, stiffness=(40.0, 70.0, 20.0, 6.0))
+    made = verdict(springs=(PRESCRIBED, AT_LIMIT), optima=(OPTIMUM, others), starts=2)
+    assert text(made)["other optima"].endswith("with K_D left 70 to 92 N m/rad")
+
+
 def test_uncertain_ends_are_admitted() -> None:
     line = text(verdict(springs=(replace(INSIDE, certain=False),)))["K_P right"]
     assert "not certain" in line
@@ -107,7 +122,7 @@ def test_stops_are_measured_on_the_stride() -> None:
 
 def test_other_optima_are_counted_with_their_springs() -> None:
     assert "starts: 8" in text(verdict())["other optima"]
-    other = replace(OPTIMUM, start=1, stiffness=(80.0, 91.0))
+    other = replace(OPTIMUM, start=1, stiffness=(40.0, 91.0, 80.0, 6.0))
     line = text(verdict(optima=(OPTIMUM, other), starts=4))["other optima"]
     assert line.startswith("1 of 3 other starts end within 5 %")
     assert "K_P right 20 to 80" in line

@@ -18,7 +18,15 @@ if TYPE_CHECKING:
 __all__ = ["uncertainty_command"]
 
 ENTRIES = frozenset(
-    {"base", "draws", "figures", "draws.csv", "uncertainty.csv", "correlations.csv"}
+    {
+        "base",
+        "draws",
+        "figures",
+        "draws.csv",
+        "uncertainty.csv",
+        "correlations.csv",
+        "uncertainty.json",
+    }
 )
 """All that the command writes."""
 

@@ -11,7 +11,7 @@ from pathwalker_cli.conventions import Side, to_degrees
 from pathwalker_cli.evaluation.ankle import ankle_line, ankle_profile, recorded_ankle_profiles
 from pathwalker_cli.evaluation.cycle_curves import FINE
 from pathwalker_cli.evaluation.traces import Trace
-from pathwalker_cli.output.figures.style import NEUTRAL, SMALL, zero_line
+from pathwalker_cli.output.figures.style import NEUTRAL, TEXT, zero_line
 
 __all__ = ["draw_ankle"]
 
@@ -34,18 +34,17 @@ def draw_ankle(ax: Axes, shown: Sequence[Trace], side: Side) -> None:
     zero_line(ax)
     for trace in shown:
         _draw_recorded(ax, trace, side)
-    ax.margins(y=0.08 * (1 + len(shown)))  # room for the slopes above the curves
+    ax.margins(y=0.08 * (2 + len(shown)))  # room for the slopes above the curves
     for i, trace in enumerate(shown):
         slope, alone = _draw_profile(ax, trace, side), trace.order is None
-        text = f"mean slope {slope:.0f} N m/rad{_recorded_slopes(trace, side)}"
+        text = f"slope {slope:.0f} N m/rad{_recorded_slopes(trace, side)}"
         ax.annotate(
             text if alone else f"{slope:.0f} N m/rad",
             (0.03, 0.97),
-            (0, -1.3 * SMALL * i),
+            (0, -1.3 * TEXT * i),
             xycoords="axes fraction",
             textcoords="offset points",
             va="top",
-            fontsize=SMALL,
             color="black" if alone else trace.look(side)["color"],
         )
 

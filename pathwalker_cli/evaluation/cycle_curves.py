@@ -26,7 +26,7 @@ from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.traces import Trace
 from pathwalker_cli.inverse.bands import POINTS
 from pathwalker_cli.output.figures.curves import CLINICAL_ANGLE, EXTENSION, Band
-from pathwalker_cli.output.figures.style import dress, percent_axis, small_labels, zero_line
+from pathwalker_cli.output.figures.style import dress, percent_axis, zero_line
 
 __all__ = [
     "ACTIVATIONS",
@@ -94,7 +94,6 @@ def draw_cycle(ax: Axes, curve: CycleCurve, shown: Sequence[Trace], side: Side) 
                 _mark_least(ax, trace, line, side)
         ax.axvline(_toe_off(trace.gait, side), **(look | {"linewidth": 0.6}))
     percent_axis(ax)
-    ax.set_xticks([0, 50, 100])
 
 
 def known_curves(curves: Sequence[CycleCurve], shown: Sequence[Trace]) -> tuple[CycleCurve, ...]:
@@ -104,9 +103,8 @@ def known_curves(curves: Sequence[CycleCurve], shown: Sequence[Trace]) -> tuple[
 
 def dress_cycle(ax: Axes, curve: CycleCurve, side: Side, label: bool) -> None:
     """Give a low panel its title and, if wanted, the label of its y axis in two lines."""
-    dress(ax, curve.title(side), y=curve.label.replace(" [", "\n[") if label else "")
+    dress(ax, curve.title(side), y=curve.label if label else "")
     ax.set_xlabel(f"{side} gait cycle [%]")
-    small_labels(ax)
     ax.locator_params(axis="y", nbins=4)
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import matplotlib as mpl
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -29,15 +28,11 @@ from pathwalker_cli.evaluation.traces import Trace
 from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.output.figures.save import save_formats
 from pathwalker_cli.output.figures.style import (
-    COLUMN,
     NEUTRAL,
-    PAGE,
     STYLE,
     dress,
     legend,
     new_figure,
-    percent_axis,
-    small_labels,
 )
 
 __all__ = [
@@ -62,15 +57,9 @@ def joint_angle_figure(trace: Trace) -> Figure:
 
     A dot marks the least knee flexion of stance.
     """
-    fig = new_figure(PAGE, 3.8)
-    panels = fig.subplots(2, len(ANGLES), sharex=True, sharey="col")
-    for row, side in enumerate(BOTH_SIDES):
-        for ax, curve in zip(panels[row], ANGLES, strict=True):
-            dress(ax, curve.title(side), y=curve.label)
-            draw_cycle(ax, curve, [trace], side)
-            percent_axis(ax, label=row == 1)
-            ax.set_xticks([0, 50, 100])
-    legend(fig, legend_handles([trace], dot="least knee flexion"))
+    handles = legend_handles([trace], dot="least knee flexion")
+    fig = cycle_pairs(ANGLES, [trace], _head(len(handles)))
+    legend(fig, handles)
     return fig
 
 
@@ -82,14 +71,9 @@ def ground_force_figure(trace: Trace) -> Figure:
     """
     if trace.gait.force is None:
         raise ValueError(f"the forces of {trace.gait.name} are not known")
-    fig = new_figure(PAGE, 3.8)
-    panels = fig.subplots(2, 2, sharex=True, sharey="row")
-    for row, curve in enumerate(FORCES):
-        for ax, side in zip(panels[row], BOTH_SIDES, strict=True):
-            dress(ax, curve.title(side), y=curve.label if side == "right" else "")
-            draw_cycle(ax, curve, [trace], side)
-            percent_axis(ax, label=row == 1)
-    legend(fig, legend_handles([trace]))
+    handles = legend_handles([trace])
+    fig = cycle_pairs(FORCES, [trace], _head(len(handles)))
+    legend(fig, handles)
     return fig
 
 
@@ -99,25 +83,24 @@ def ankle_figure(trace: Trace) -> Figure:
     Raises:
         ValueError: If the torques of the gait are not known.
     """
-    fig = new_figure(PAGE, 3.2)
-    _draw_ankles(fig.subplots(1, 2, sharex=True, sharey=True), [trace], "net plantarflexing torque")
     handles = [*_trace_handles([trace]), *_ankle_handles()]
     if trace.recorded is not None:
         handles.append(Line2D([], [], color="#999999", linewidth=0.5, label="recorded stances"))
         handles.append(Line2D([], [], color=NEUTRAL, linewidth=1.1, label="their mean"))
+    fig = ankle_pair([trace], _head(len(handles)))
     legend(fig, handles)
     return fig
 
 
 def cycle_pairs(curves: Sequence[CycleCurve], shown: Sequence[Trace], head: float = 0.0) -> Figure:
-    """Return a figure as wide as a column, with a row of right and left side per quantity.
+    """Return a figure with a row of right and left side per quantity.
 
     Args:
         curves: The quantities.
         shown: The gaits.
         head: Height to keep for a legend [in].
     """
-    fig = new_figure(COLUMN, head + PAIR_HEIGHT * len(curves))
+    fig = new_figure(head + PAIR_HEIGHT * len(curves))
     panels = fig.subplots(len(curves), 2, sharey="row", squeeze=False)
     for row, curve in zip(panels, curves, strict=True):
         for ax, side in zip(row, BOTH_SIDES, strict=True):
@@ -127,16 +110,18 @@ def cycle_pairs(curves: Sequence[CycleCurve], shown: Sequence[Trace], head: floa
 
 
 def ankle_pair(shown: Sequence[Trace], head: float = 0.0) -> Figure:
-    """Return the net torque-angle profiles of both ankles, as wide as a column.
+    """Return the net torque-angle profiles of both ankles.
 
     Args:
         shown: The gaits.
         head: Height to keep for a legend [in].
     """
-    fig = new_figure(COLUMN, head + ANKLE_HEIGHT)
-    _draw_ankles(fig.subplots(1, 2, sharex=True, sharey=True), shown, "net plantarflexing torque")
-    for ax in fig.axes:
-        small_labels(ax)
+    fig = new_figure(head + ANKLE_HEIGHT)
+    panels = fig.subplots(1, 2, sharex=True, sharey=True)
+    for ax, side in zip(panels, BOTH_SIDES, strict=True):
+        draw_ankle(ax, shown, side)
+        label = "net plantarflexing torque [N m]" if side == "right" else ""
+        dress(ax, f"{side.capitalize()} ankle in stance", "dorsiflexion [deg]", label)
     return fig
 
 
@@ -207,12 +192,9 @@ def legend_handles(shown: Sequence[Trace], dot: str = "") -> list[Any]:
     return handles
 
 
-def _draw_ankles(panels: Sequence[Axes], shown: Sequence[Trace], torque: str) -> None:
-    """Draw both ankles."""
-    for ax, side in zip(panels, BOTH_SIDES, strict=True):
-        draw_ankle(ax, shown, side)
-        label = f"{torque} [N m]" if side == "right" else ""
-        dress(ax, f"{side.capitalize()} ankle in stance", "dorsiflexion [deg]", label)
+def _head(entries: int) -> float:
+    """Return the height that a legend of two columns needs [in]."""
+    return 0.15 * ((entries + 1) // 2) + 0.1
 
 
 def _trace_handles(shown: Sequence[Trace]) -> list[Any]:

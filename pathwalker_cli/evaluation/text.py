@@ -27,6 +27,7 @@ _DIGITS: Final = {
     "s": 3,
     "1": 3,
     "rad": 2,
+    "rad^2": 3,
     "body weights": 2,
     "N": 1,
     "N m": 1,
@@ -140,6 +141,7 @@ def number_text(value: float | None, quantity: Quantity, sign: bool = False) -> 
     digits = _DIGITS[quantity.unit]
     if _is_share(quantity):
         shown, digits = 100.0 * value, 1
+    shown = round(shown, digits) + 0.0  # adding 0.0 makes 0.0 of -0.0
     return f"{shown:{'+' if sign else ''}.{digits}f}"
 
 

@@ -28,11 +28,11 @@ from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
     NEUTRAL,
-    NORMAL,
-    PAGE,
     STYLE,
+    TEXT,
     dress,
     legend,
+    legend_panel,
     new_figure,
     percent_axis,
     zero_line,
@@ -85,16 +85,13 @@ def joint_angle_figure(trials: Sequence[StudyTrial]) -> Figure:
         trials: Trials of one condition.
     """
     bands = _bands(trials, lambda trial: trial.motion)
-    fig = new_figure(PAGE, 4.0)
-    panels = fig.subplots(2, 3).ravel()
+    fig = new_figure(3.9)
+    panels = fig.subplots(3, 2).ravel()
     for ax, (joint, (title, label)) in zip(panels, _ANGLES.items(), strict=False):
         factor = CLINICAL_ANGLE.get(joint, 1.0) * float(to_degrees(1.0))
         pattern = f"{joint}_{{}}" if joint in CLINICAL_ANGLE else joint
         _panel(ax, bands, pattern, factor, title, label)
-    panels[-1].axis("off")
-    panels[-1].legend(
-        handles=_handles(bands, "hip_{}"), loc="upper left", frameon=False, handlelength=2.6
-    )
+    legend_panel(panels[-1], _handles(bands, "hip_{}"))
     return fig
 
 
@@ -109,11 +106,12 @@ def joint_torque_figure(trials: Sequence[StudyTrial], body_mass: float) -> Figur
         body_mass: Mass of the patient [kg].
     """
     bands = _bands(trials, lambda trial: trial.tau, measured=True)
-    fig = new_figure(PAGE, 2.6)
-    for ax, (joint, title) in zip(fig.subplots(1, 3), _TORQUES.items(), strict=True):
+    fig = new_figure(2.9)
+    panels = fig.subplots(2, 2).ravel()
+    for ax, (joint, title) in zip(panels, _TORQUES.items(), strict=False):
         factor = EXTENSION[joint] / body_mass
-        _panel(ax, bands, f"{joint}_{{}}", factor, title, "internal net torque [N m/kg]")
-    legend(fig, _handles(bands, "hip_{}", measured=True))
+        _panel(ax, bands, f"{joint}_{{}}", factor, title, "net torque [N m/kg]")
+    legend_panel(panels[-1], _handles(bands, "hip_{}", measured=True))
     return fig
 
 
@@ -125,7 +123,7 @@ def ground_force_figure(trials: Sequence[StudyTrial], body_mass: float) -> Figur
         body_mass: Mass of the patient [kg].
     """
     bands = _bands(trials, lambda trial: trial.forces, measured=True)
-    fig = new_figure(PAGE, 2.8)
+    fig = new_figure(2.2)
     for ax, (axis, (title, label)) in zip(fig.subplots(1, 2), _FORCES.items(), strict=True):
         _panel(ax, bands, f"force_{{}}_{axis}", 100.0 / (body_mass * GRAVITY), title, label)
     legend(fig, _handles(bands, "force_{}_z", measured=True))
@@ -145,9 +143,9 @@ def marker_figure(trials: Sequence[StudyTrial]) -> Figure:
     names = [names[i] for i in np.flatnonzero(known)]
     values = values[:, known]
     mean = np.nanmean(values, axis=0)
-    fig = new_figure(PAGE, 0.9 + 0.17 * len(names))
+    fig = new_figure(0.9 + 0.17 * len(names))
     ax = fig.subplots()
-    dress(ax, x="distance from the walker, root mean square [mm]")
+    dress(ax, x="distance from the walker,\nroot mean square [mm]")
     ax.grid(visible=False, axis="y")
     rows = np.arange(len(names))
     low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
@@ -158,7 +156,7 @@ def marker_figure(trials: Sequence[StudyTrial]) -> Figure:
     ax.set_xlim(left=0.0)
     handles: list[Artist] = [
         Line2D([], [], color=LINE_COLOUR["right"], marker="o", linestyle="", label="mean"),
-        Patch(facecolor="#9ecae1", label=_counted("range over", len(found), "trial")),
+        Patch(facecolor="#9ecae1", label=f"range over {_counted(len(found), 'trial')}"),
     ]
     legend(fig, handles)
     return fig
@@ -190,7 +188,7 @@ def save_recorded_figures(
     with mpl.rc_context(STYLE):
         for name, maker in makers.items():
             figure = maker()
-            name_figure(figure, _counted(f"{trials[0].condition},", len(trials), "trial"))
+            name_figure(figure, f"{trials[0].condition}, {_counted(len(trials), 'trial')}")
             for extension in formats:
                 names.append(f"{name}.{extension}")
                 metadata = {"Software": None} if extension == "png" else {"Date": None}
@@ -203,7 +201,7 @@ def name_figure(figure: Figure, words: str) -> None:
     """Put words above its legend, so that a figure tells what it shows wherever it goes."""
     inside = [box for ax in figure.axes if (box := ax.get_legend())]
     for box in [*figure.legends, *inside]:
-        box.set_title(words, prop=FontProperties(size=NORMAL, weight="bold"))
+        box.set_title(words, prop=FontProperties(size=TEXT, weight="bold"))
         box.set_alignment("left")
 
 
@@ -286,11 +284,11 @@ def _handles(bands: _Bands, pattern: str, measured: bool = False) -> list[Artist
     for side, band in bands.sides.items():
         count = band.count[:, band.names.index(pattern.format(SUFFIX[side]))]
         thing = "measured stride" if measured else "stride"
-        label = _counted(f"{side}, mean of", int(count.max()), thing)
+        label = f"{side}, mean of\n{_counted(int(count.max()), thing)}"
         style = LINE_STYLE[side]
         handles.append(Line2D([], [], color=LINE_COLOUR[side], linestyle=style, label=label))
     handles.append(Patch(facecolor="#bbbbbb", alpha=0.6, label="range"))
-    handles.append(Line2D([], [], color=NEUTRAL, linewidth=0.6, label="upright: mean toe-off"))
+    handles.append(Line2D([], [], color=NEUTRAL, linewidth=0.6, label="mean toe-off"))
     return handles
 
 
@@ -302,6 +300,6 @@ def _plain(point: str) -> str:
     return f"{marker} on {side}{name}"
 
 
-def _counted(words: str, count: int, thing: str) -> str:
-    """Return "mean of 3 strides"."""
-    return f"{words} {count} {thing}{'' if count == 1 else 's'}"
+def _counted(count: int, thing: str) -> str:
+    """Return "3 strides"."""
+    return f"{count} {thing}{'' if count == 1 else 's'}"

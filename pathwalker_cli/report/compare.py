@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.quantities import QUANTITIES, Quantity
 from pathwalker_cli.evaluation.run import gaits_of_runs
+from pathwalker_cli.goals import GOALS
 from pathwalker_cli.output.run_folder import load_run
 from pathwalker_cli.report.config_values import differing_values
 
@@ -17,6 +19,7 @@ __all__ = ["Compared", "Comparison", "compare_runs"]
 
 _LOADS: Final = "Loads"
 _WORK: Final = "Work over the stride"
+_GOALS: Final = "Clinical goals, whether or not the cost weighs them"
 _SOLUTION: Final = "Solution"
 
 
@@ -56,9 +59,20 @@ COMPARED: Final = (
         "effort_per_distance",
         *(f"{kind}_stiffness_{s}" for kind in ("dorsiflexion", "plantarflexion") for s in _BOTH),
     ),
+    *(
+        Quantity(f"goals.{name}", name.replace("_", " "), goal.unit, _GOALS)
+        for name, goal in GOALS.items()
+    ),
     Quantity("cost", "cost", "1", _SOLUTION),
 )
-"""The metrics that are compared, in order; keys of `metrics.json`."""
+"""The metrics that are compared, in order; keys of `metrics.json`, of its parts with a dot."""
+
+_DEPENDS: Final = {
+    "cost": "cost.",
+    "effort_per_distance": "cost.activation_power",
+    "goals.discomfort": "cost.comfort_ranges",
+}
+"""Keys of the config, or their beginnings, that say what a metric means."""
 
 
 @dataclass(frozen=True)
@@ -68,16 +82,22 @@ class Compared:
     Args:
         quantity: What it is.
         values: Its value in each run, None where a run does not have it.
+        other: Runs whose config gives it another meaning than the first run's: no difference is
+            told.
     """
 
     quantity: Quantity
     values: tuple[float | None, ...]
+    other: frozenset[int] = frozenset()
 
     @property
     def differences(self) -> tuple[float | None, ...]:
-        """Value minus that of the first run."""
+        """Value minus that of the first run; None where it cannot be told."""
         base = self.values[0]
-        return tuple(None if base is None or v is None else v - base for v in self.values)
+        return tuple(
+            None if base is None or v is None or i in self.other else v - base
+            for i, v in enumerate(self.values)
+        )
 
     @property
     def shares(self) -> tuple[float | None, ...]:
@@ -117,7 +137,7 @@ class Comparison:
             if len(set(values)) > 1:
                 pairs = zip(self.names, values, strict=True)
                 found.append(f"different {what}: {', '.join(f'{v} ({n})' for n, v in pairs)}")
-        if any(key.startswith("cost.") for key in self.config):
+        if any(row.other for row in self.rows if row.quantity.key == "cost"):
             found.append("costs of different weights or goals cannot be compared")
         return tuple(found)
 
@@ -131,12 +151,32 @@ def compare_runs(folders: Sequence[Path]) -> Comparison:
     gaits = gaits_of_runs(folders)
     runs = [load_run(folder) for folder in folders]
     found = (
-        Compared(quantity, tuple(_number(run.metrics.get(quantity.key)) for run in runs))
+        Compared(
+            quantity,
+            tuple(_number(run.metrics, quantity.key) for run in runs),
+            _other(quantity.key, [run.config for run in runs]),
+        )
         for quantity in COMPARED
     )
     rows = tuple(row for row in found if any(value is not None for value in row.values))
     return Comparison(gaits, rows, differing_values([run.config for run in runs]))
 
 
-def _number(value: Any) -> float | None:
+def _other(key: str, configs: Sequence[StudyConfig]) -> frozenset[int]:
+    """Return the runs whose config gives a metric another meaning than that of the first run."""
+    beginning, first = _DEPENDS.get(key), configs[0]
+    if beginning is None:
+        return frozenset()
+    return frozenset(
+        i
+        for i, config in enumerate(configs)
+        if (key == "cost" and config.fits != first.fits)
+        or any(name.startswith(beginning) for name in differing_values([first, config]))
+    )
+
+
+def _number(metrics: Mapping[str, Any], key: str) -> float | None:
+    """Return a number of the metrics, None where there is none."""
+    group, _, name = key.rpartition(".")
+    value = (metrics.get(group) or {}).get(name) if group else metrics.get(name)
     return float(value) if isinstance(value, int | float) else None

@@ -61,7 +61,7 @@ def _against_base(found: Comparison, which: int) -> Iterator[str]:
                 number_text(row.values[0], quantity),
                 number_text(row.values[which], quantity),
                 number_text(row.differences[which], quantity, sign=True),
-                "-" if share is None else f"{100.0 * share:+.1f}",
+                "-" if share is None else f"{round(100.0 * share, 1) + 0.0:+.1f}",
                 unit_text(quantity),
             )
 

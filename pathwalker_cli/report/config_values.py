@@ -37,4 +37,11 @@ def _entries(prefix: str, content: Mapping[str, Any]) -> Iterator[tuple[str, str
         if isinstance(value, Mapping):
             yield from _entries(f"{prefix}{key}.", value)
         else:
-            yield f"{prefix}{key}", str(value)
+            yield f"{prefix}{key}", _text(value)
+
+
+def _text(value: Any) -> str:
+    """Return a value as people read it."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return "none" if value is None else str(value)

@@ -23,7 +23,7 @@ NOT_A_DEVICE = (
 )
 
 Mark = Literal["", "heading", "failed", "good"]
-Shape = Literal["pair", "tall", "wide"]
+Shape = Literal["pair", "tall"]
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,7 @@ class Drawing:
 
     Args:
         svg: The element.
-        shape: "pair" for two panels in a column, "tall" for twice that height, "wide" for the
-            width of a page.
+        shape: "pair" for a row of two panels, "tall" for what is at least twice as high.
     """
 
     svg: str

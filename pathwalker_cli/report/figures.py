@@ -19,12 +19,25 @@ from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_ha
 from pathwalker_cli.evaluation.traces import Trace, lone_trace, traces
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.output.figures.inline import inline_svg
-from pathwalker_cli.output.figures.style import COLUMN, STYLE, legend, new_figure
+from pathwalker_cli.output.figures.style import STYLE, legend, new_figure
 from pathwalker_cli.output.recorded_figures import joint_torque_figure, name_figure
+from pathwalker_cli.patient_blocks import SpringSet
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
+from pathwalker_cli.report.study_files import Spreads
+from pathwalker_cli.studies.landscape.figures import Chosen, cost_figure
+from pathwalker_cli.studies.landscape.result import Landscape
+from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure
+from pathwalker_cli.studies.tradeoff.result import Tradeoff
+from pathwalker_cli.studies.uncertainty.figures import spread_figure
 
-__all__ = ["curve_section", "torque_drawing"]
+__all__ = [
+    "curve_section",
+    "landscape_drawing",
+    "spread_drawing",
+    "torque_drawing",
+    "tradeoff_drawing",
+]
 
 
 def curve_section(runs: Sequence[ReportRun]) -> Section:
@@ -67,7 +80,34 @@ def torque_drawing(
         name_figure(figure, f"{trials[0].condition}, {len(trials)} trials")
         return figure
 
-    return _drawn(draw, name, title, "wide")
+    return _drawn(draw, name, title, "tall")
+
+
+def landscape_drawing(landscape: Landscape, springs: SpringSet | None, chosen: Chosen) -> Drawing:
+    """Return the cost over the springs of a side.
+
+    Args:
+        landscape: The landscape.
+        springs: Springs that exist, or None.
+        chosen: K_D and K_P of the springs to take by side [N m/rad].
+    """
+    title = "Cost above the least [%] over K_D and K_P [N m/rad]"
+    return _drawn(lambda: cost_figure(landscape, springs, chosen), "landscape", title, "tall")
+
+
+def tradeoff_drawing(tradeoff: Tradeoff) -> Drawing:
+    """Return effort over speed, and the springs along the front."""
+    title = "Effort per distance [s/m] and springs [N m/rad] over walking speed [m/s]"
+    return _drawn(lambda: tradeoff_figure(tradeoff), "tradeoff", title, "tall")
+
+
+def spread_drawing(found: Spreads) -> Drawing:
+    """Return where springs, cost and gait of all draws end up."""
+    title = "Springs of all draws [N m/rad], and deviation of cost and gait from the base [%]"
+    return _drawn(
+        lambda: spread_figure(found.values, found.ranges, found.spreads),
+        "uncertainty", title, "tall",
+    )  # fmt: skip
 
 
 def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
@@ -90,8 +130,8 @@ def _legend(shown: Sequence[Trace]) -> Drawing:
     handles = legend_handles(shown)
 
     def draw() -> Figure:
-        figure = new_figure(COLUMN, 0.17 * ((len(handles) + 1) // 2) + 0.06)
-        legend(figure, handles, columns=2)
+        figure = new_figure(0.17 * ((len(handles) + 1) // 2) + 0.06)
+        legend(figure, handles)
         return figure
 
     return _drawn(draw, "legend", "Legend of the curves")

@@ -13,25 +13,30 @@ from pathwalker_cli.io.json_file import read_json
 
 __all__ = ["STUDIES", "Kind", "Study", "folder_kind", "sorted_folders", "studies_near"]
 
-Kind = Literal["run", "recorded", "cohort", "perturb", "sensitivity", "landscape"]
+Kind = Literal[
+    "run", "recorded", "cohort", "perturb", "sensitivity", "landscape", "tradeoff", "uncertainty"
+]
 
 _MARKS: Final[tuple[tuple[Kind, str], ...]] = (
     ("run", "metrics.json"),
     ("perturb", "perturbation.json"),
     ("sensitivity", "sensitivity.json"),
     ("landscape", "landscape.json"),
+    ("tradeoff", "tradeoff.json"),
+    ("uncertainty", "uncertainty.json"),
     ("cohort", "cases.csv"),
     ("recorded", "stances.csv"),
 )
 """A file that only such a folder has."""
 
 STUDIES: Final[Mapping[Kind, str]] = {
-    kind: file for kind, file in _MARKS if kind in ("perturb", "sensitivity", "landscape")
+    kind: file for kind, file in _MARKS if kind not in ("run", "recorded", "cohort")
 }
 """The studies around an optimum and their summaries."""
 
 _ALLOWED: Final = (
-    "folders that solve, id, batch, perturb, sensitivity or landscape of pathwalker wrote"
+    "folders that solve, id, batch, perturb, sensitivity, landscape, tradeoff or uncertainty of "
+    "pathwalker wrote"
 )
 
 _SAME: Final = 0.02
@@ -56,7 +61,7 @@ class Study:
     @property
     def optimum(self) -> Mapping[str, Any]:
         """Measures of the optimum that it stands on."""
-        found = self.content.get("optimum")
+        found = self.content.get("optimum", self.content.get("base"))
         if found is None and isinstance(start := self.content.get("start"), Mapping):
             found = start.get("measures")
         return found if isinstance(found, Mapping) else {}

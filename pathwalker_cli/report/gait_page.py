@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pathwalker_cli.conventions import SIDES, to_degrees
+from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
 from pathwalker_cli.evaluation.evaluate import Change
 from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.report.assumptions import assumption_section
@@ -13,7 +13,7 @@ from pathwalker_cli.report.figures import curve_section
 from pathwalker_cli.report.folders import Study
 from pathwalker_cli.report.gait_table import gait_section
 from pathwalker_cli.report.runs import ReportRun, changes_of
-from pathwalker_cli.report.springs import recommended, spring_section
+from pathwalker_cli.report.springs import prescribed, recommended, spring_section
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.studies.measures import measure_of
 
@@ -31,7 +31,7 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
     worn = [run for run in runs if run.worn]
     sections = [spring_section(run) for run in worn]
     sections += [gait_section(runs, changes), curve_section(runs)]
-    sections += [study_section(study) for study in studies]
+    sections += [study_section(study, _base(study, runs)) for study in studies]
     sections.append(assumption_section(runs))
     facts = (
         Fact("Patient", patient.id),
@@ -42,6 +42,11 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
     )
     answer = " ".join(_answer(run, changes) for run in worn or runs)
     return Page(f"Gait of {patient.id}", facts, answer, tuple(_warnings(runs)), tuple(sections))
+
+
+def _base(study: Study, runs: Sequence[ReportRun]) -> ReportRun:
+    """Return the run that a study stands on."""
+    return next((run for run in runs if study.stands_on(run.run.metrics)), runs[-1])
 
 
 def _of_runs(runs: Sequence[ReportRun]) -> list[Fact]:
@@ -74,13 +79,16 @@ def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
         saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot ({share:+.0f} %)"
     real = run.verdict is not None and run.verdict.snapped is not None
     kind = "Springs to take" if real else "Springs found"
+    if all(prescribed(run, name) for name in STIFFNESSES):
+        kind = "Springs worn"
     return f"{kind}: {_springs(run)}; predicted gait walks {gait}{saved}."
 
 
 def _springs(run: ReportRun) -> str:
     """Return the springs with how sure they are, sides that agree together."""
     stiffness, verdict = recommended(run), run.verdict
-    sure = {s.spring: s.determined for s in verdict.springs} if verdict else {}
+    sure = {name: "prescribed" for name in STIFFNESSES if prescribed(run, name)}
+    sure |= {s.spring: s.determined for s in verdict.springs} if verdict else {}
     parts: dict[str, list[str]] = {}
     for name, value in stiffness.items():
         kind, _, side = measure_of(name).label.rpartition(" ")

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from pathwalker_cli.config import study_patient
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.run import gait_of_run
-from pathwalker_cli.output.run_folder import Run, load_run
-from pathwalker_cli.output.run_metrics import sha256
-from pathwalker_cli.patient import Patient
+from pathwalker_cli.output.run_folder import PATIENT, Run, load_run
+from pathwalker_cli.output.run_metrics import patient_hash
+from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.studies.verdict import Verdict, verdict_of_metrics
 
 __all__ = ["ReportRun", "changes_of", "read_runs"]
@@ -54,11 +55,16 @@ class ReportRun:
 
     @cached_property
     def patient_changed(self) -> bool:
-        """Whether the patient's file is another one than at the time of the run."""
-        then = self.run.metrics.get("input_hashes", {}).get("patient")
-        return then is not None and self.patient.source is not None and (
-            sha256(self.patient.content) != then
-        )  # fmt: skip
+        """Whether the patient's file says something else of this run's condition than it did.
+
+        Barefoot, the orthosis does not matter.  Runs that kept no patient are told by their hash.
+        """
+        kept = self.run.folder / PATIENT
+        if kept.is_file():
+            then, today = load_patient(kept), load_patient(self.run.config.patient)
+            return _of_condition(then, self.worn) != _of_condition(today, self.worn)
+        read = self.run.metrics.get("input_hashes", {}).get("patient")
+        return read is not None and read != patient_hash(self.patient)
 
 
 def read_runs(folders: Sequence[Path]) -> tuple[ReportRun, ...]:
@@ -89,6 +95,15 @@ def read_runs(folders: Sequence[Path]) -> tuple[ReportRun, ...]:
         for name, run, gait in zip(names, runs, gaits, strict=True)
     ]  # fmt: skip
     return tuple(sorted(found, key=lambda each: each.worn))
+
+
+def _of_condition(patient: Patient, worn: bool) -> dict[str, Any]:
+    """Return what a run of a condition may take from a patient; barefoot recordings bound both."""
+    worn_only: dict[str, Any] = {
+        "orthosis": True, "contact_points": {"orthosis"}, "recorded": {"orthosis"},
+    }  # fmt: skip
+    left_out = {"description": True, **({} if worn else worn_only)}
+    return patient.model_dump(mode="json", exclude=left_out, exclude_none=True)
 
 
 def _labels(folders: Sequence[Path]) -> list[str]:

@@ -9,9 +9,15 @@ from pathwalker_cli.report.content import Fact, Row, Section, Table
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.studies.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, Verdict
-from pathwalker_cli.studies.verdict_text import beaten_text, per_degree, reservations, stop_text
+from pathwalker_cli.studies.verdict_text import (
+    PRESCRIBED,
+    beaten_text,
+    per_degree,
+    reservations,
+    stop_text,
+)
 
-__all__ = ["recommended", "spring_section", "verdict_words"]
+__all__ = ["prescribed", "recommended", "spring_section", "verdict_words"]
 
 _HEAD: Final = (
     "spring", "take", "[N m/rad]", "[N m/deg]", "found [N m/rad]",
@@ -20,9 +26,10 @@ _HEAD: Final = (
 )  # fmt: skip
 
 _NOT_JUDGED: Final = (
-    "The springs of this run were not judged (verdict: false, a quick check, or no free spring): "
-    "the table shows those of least effort only."
+    "The springs of this run were not judged (verdict: false, or a quick check): the table shows "
+    "those of least effort only."
 )
+_NO_CHOICE: Final = "The config prescribes all springs: nothing was identified."
 
 
 def spring_section(run: ReportRun) -> Section:
@@ -36,7 +43,8 @@ def spring_section(run: ReportRun) -> Section:
     lines: tuple[str, ...] = ()
     facts: tuple[Fact, ...] = ()
     if verdict is None:
-        lines = (_NOT_JUDGED,)
+        free = any(not prescribed(run, name) for name in STIFFNESSES)
+        lines = (_NOT_JUDGED if free else _NO_CHOICE,)
     else:
         facts = tuple(_facts(verdict))
     table = Table(_HEAD, rows, notes=tuple(notes), columns="wwnnnnnp")
@@ -54,6 +62,8 @@ def recommended(run: ReportRun) -> dict[str, float]:
 
 def verdict_words(spring: SpringVerdict) -> str:
     """Return in words how sure a spring is."""
+    if spring.prescribed:
+        return PRESCRIBED
     if not spring.limit:
         return spring.determined
     end = {"upper": "stiffest", "lower": "softest"}[spring.limit]
@@ -73,15 +83,22 @@ def _row(run: ReportRun, name: str) -> Row:
     spring = next((s for s in verdict.springs if s.spring == name), None) if verdict else None
     snapped = verdict.snapped.names.get(name, "") if verdict and verdict.snapped else ""
     region = ("-", "-")
-    words = "not judged" if verdict is None else "prescribed, not identified"
+    words = PRESCRIBED if prescribed(run, name) else "not judged"
     if spring is not None:
+        words = verdict_words(spring)
+    if spring is not None and not spring.prescribed:
         low, high = spring.region
         region = f"{low:.1f} to {high:.1f}", f"{per_degree(low):.2f} to {per_degree(high):.2f}"
-        words = verdict_words(spring)
     label = measure_of(name).label
     cells = (label, snapped or "-", f"{take:.1f}", f"{per_degree(take):.2f}", f"{found:.1f}",
              *region, words)  # fmt: skip
     return Row(cells, "good" if snapped else "")
+
+
+def prescribed(run: ReportRun, name: str) -> bool:
+    """Return whether a run had no choice of a spring."""
+    low, high = (run.run.metrics.get("stiffness_ranges") or {}).get(name, (0.0, 1.0))
+    return bool(low == high)
 
 
 def _facts(verdict: Verdict) -> list[Fact]:

@@ -2,41 +2,59 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
+from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.report.content import Row, Section, Table
+from pathwalker_cli.report.figures import landscape_drawing, spread_drawing, tradeoff_drawing
 from pathwalker_cli.report.folders import Study
+from pathwalker_cli.report.runs import ReportRun
+from pathwalker_cli.report.springs import recommended
+from pathwalker_cli.report.study_files import Spreads, landscape_of, spreads_of
+from pathwalker_cli.studies.landscape.figures import Chosen
 from pathwalker_cli.studies.measures import COMPARED, MEASURES, measure_of
 from pathwalker_cli.studies.sensitivity.text import label_of
+from pathwalker_cli.studies.tradeoff.files import tradeoff_of_content
+from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
+from pathwalker_cli.studies.uncertainty.result import Spread
+from pathwalker_cli.studies.uncertainty.text import shown_text
 
 __all__ = ["study_section"]
 
 _LEAST: Final = 1e-3
 """Elasticity [% per %] below which a number moves nothing that matters."""
 
-_K_D: Final = "dorsiflexion_stiffness [N m/rad]"
-_K_P: Final = "plantarflexion_stiffness [N m/rad]"
 
+def study_section(study: Study, run: ReportRun) -> Section:
+    """Return table and figure of a study.
 
-def study_section(study: Study) -> Section:
-    """Return the table of a study.
+    Args:
+        study: The study.
+        run: The run that it stands on.
 
     Raises:
         DataError: If its files are not those that the command wrote.
     """
-    make = {"sensitivity": _sensitivity, "perturb": _perturbation, "landscape": _landscape}
+    make = {
+        "sensitivity": _sensitivity,
+        "perturb": _perturbation,
+        "landscape": _landscape,
+        "tradeoff": _tradeoff,
+        "uncertainty": _uncertainty,
+    }
     try:
-        return make[study.kind](study)
-    except (KeyError, TypeError, AttributeError, ValueError) as problem:
+        return make[study.kind](study, run)
+    except (LookupError, TypeError, AttributeError, ValueError, StopIteration) as problem:
         what = f"does not hold what `pathwalker {study.kind}` writes: {problem!r}"
         raise DataError(what, where=str(study.folder), mend="make the study again") from None
 
 
-def _sensitivity(study: Study) -> Section:
+def _sensitivity(study: Study, run: ReportRun) -> Section:
     """Return what one per cent more of every number changes."""
     found: Mapping[str, Mapping[str, Any]] = study.content["elasticities"]
     shown = [m for m in MEASURES if any(_moves(values.get(m.key)) for values in found.values())]
@@ -68,7 +86,7 @@ def _elasticity(value: float | None) -> str:
     return f"{value:.3f}" if _moves(value) else "."
 
 
-def _perturbation(study: Study) -> Section:
+def _perturbation(study: Study, run: ReportRun) -> Section:
     """Return what moved springs change."""
     rows = []
     for row in study.content["rows"]:
@@ -89,58 +107,117 @@ def _change(share: float | None) -> str:
     return "no solution" if share is None else f"{round(100.0 * share, 2) + 0.0:+.2f}"
 
 
-def _landscape(study: Study) -> Section:
-    """Return the cost over K_D and K_P as a table, with the region of nearly best springs."""
-    content = study.content
-    tolerance, side = content["tolerance"], content["side"]
-    cells = _increases(study.folder / "landscape.csv")
-    k_d, k_p = content["dorsiflexion_stiffness"], content["plantarflexion_stiffness"]
-    rows = []
-    for low in k_p:
-        found = (cells.get((_key(high), _key(low))) for high in k_d)
-        rows.append(Row((f"{low:.3g}", *(_increase(value, tolerance) for value in found))))
-    best, region = content["best"], content["region"]
-    lines = [
-        f"Least cost at K_D {best['dorsiflexion_stiffness']:.1f}, "
-        f"K_P {best['plantarflexion_stiffness']:.1f} N m/rad ({_side(side)})."
-    ]
+def _landscape(study: Study, run: ReportRun) -> Section:
+    """Return the cost over K_D and K_P as a map, with the region of nearly best springs."""
+    found = landscape_of(study)
+    orthosis = run.patient.orthosis
+    springs = None if orthosis is None else orthosis.springs
+    best, region = found.best, found.region
+    lines = [f"Least cost at K_D {best.k_d:.1f}, K_P {best.k_p:.1f} N m/rad ({_side(found.side)})."]
     if region is not None:
-        (d_low, d_high), (p_low, p_high) = (region[_K_D.split(" ")[0]], region[_K_P.split(" ")[0]])
         lines.append(
-            f"Within {100 * tolerance:g} % of it: K_D {d_low:.1f} to {d_high:.1f}, K_P {p_low:.1f} "
-            f"to {p_high:.1f} N m/rad, {100 * region['share_of_points']:.0f} % of the grid points."
+            f"Within {100 * found.tolerance:g} % of it: K_D {region.k_d[0]:.1f} to "
+            f"{region.k_d[1]:.1f}, K_P {region.k_p[0]:.1f} to {region.k_p[1]:.1f} N m/rad, "
+            f"{100 * region.share:.0f} % of the grid points."
         )
-    table = Table(
-        ("K_P \\ K_D [N m/rad]", *(f"{value:.3g}" for value in k_d)),
-        tuple(rows),
-        caption="Cost above the least [%]; * marks springs in that region",
-    )
-    return Section("Landscape of the springs", tuple(lines), tables=(table,))
+    top = np.nanmax(found.increase)
+    lines.append(f"The most expensive point costs {100 * top:.1f} % more than the best.")
+    if found.branched:
+        lines.append(f"Several local optima at {len(found.branched)} of {len(found.bests)} points.")
+    if found.failed:
+        lines.append(f"No solution at {len(found.failed)} of {len(found.bests)} points.")
+    drawing = landscape_drawing(found, springs, _chosen(run, found.side))
+    return Section("Landscape of the springs", tuple(lines), drawings=(drawing,))
+
+
+def _chosen(run: ReportRun, side: str) -> Chosen:
+    """Return the real springs to take of a side, or of both."""
+    if run.verdict is None or run.verdict.snapped is None:
+        return {}
+    springs, sides = recommended(run), BOTH_SIDES if side == "both" else (side,)
+    return {
+        s: (springs[f"dorsiflexion_stiffness_{s}"], springs[f"plantarflexion_stiffness_{s}"])
+        for s in BOTH_SIDES
+        if s in sides
+    }
 
 
 def _side(side: str) -> str:
     return "both sides tied" if side == "both" else f"{side} side"
 
 
-def _key(value: float) -> str:
-    """Return a stiffness as the table writes it."""
-    return f"{float(value):.9g}"
+def _tradeoff(study: Study, run: ReportRun) -> Section:
+    """Return the front of speed and effort, and the springs along it."""
+    found = tradeoff_of_content(study.content)
+    springs = STIFFNESSES if found.condition == "orthosis" else ()
+    head = ("weight of speed [s^2/m^2]", "speed [m/s]", "effort [s/m]",
+            *(f"{measure_of(name).short} [N m/rad]" for name in springs), "remark")  # fmt: skip
+    rows = []
+    for point in found.points:
+        if point.solved:
+            numbers = [f"{point.speed:.3f}", f"{point.effort:.3f}"]
+            numbers += [f"{point.measures[name]:.1f}" for name in springs]
+        else:
+            numbers = ["-"] * (2 + len(springs))
+        cells = (f"{point.weight:g}", *numbers, _remark(found, point))
+        rows.append(Row(cells, "" if point.solved else "failed"))
+    table = Table(head, tuple(rows), columns=f"w{'n' * (len(head) - 2)}p")
+    lines = [
+        "How much effort a faster gait takes: the objective weighs speed more and more. A "
+        "dominated point is no faster and no cheaper than another one."
+    ]
+    drawings = (tradeoff_drawing(found),) if found.solved else ()
+    return Section("Trade-off of speed and effort", tuple(lines), tables=(table,),
+                   drawings=drawings)  # fmt: skip
 
 
-def _increases(path: Path) -> dict[tuple[str, str], str]:
-    """Return the cost above the least by K_D and K_P; of several optima the best."""
-    found: dict[tuple[str, str], str] = {}
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            for row in csv.DictReader(file):
-                if row["branch"] in ("0", "1"):
-                    found[_key(float(row[_K_D])), _key(float(row[_K_P]))] = row["cost_increase [1]"]
-    except (OSError, UnicodeDecodeError, csv.Error) as problem:
-        raise DataError(f"cannot be read: {problem}", where=str(path)) from None
-    return found
+def _remark(found: Tradeoff, point: FrontPoint) -> str:
+    """Return what to know about a point of a front, "" for nothing."""
+    if not point.solved:
+        return point.status
+    remarks = ["dominated"] * found.dominated(point)
+    remarks += ["mesh too coarse: rough numbers"] * (point.mesh_status == "inaccurate")
+    return "; ".join(remarks)
 
 
-def _increase(text: str | None, tolerance: float) -> str:
-    if not text:
-        return "no solution" if text == "" else "-"
-    return f"{100.0 * float(text):.1f}{'*' if float(text) <= tolerance else ''}"
+def _uncertainty(study: Study, run: ReportRun) -> Section:
+    """Return how far springs and gait spread when the patient's numbers are uncertain."""
+    found = spreads_of(study)
+    head = ("", "unit", "base", "median", "90 % of draws", "follows most")
+    table = Table(head, tuple(_spread_row(found, each) for each in found.spreads),
+                  columns="wwnnnp")  # fmt: skip
+    count = found.draws - found.failed
+    lines = [f"{found.draws} draws of the uncertain numbers, {count} converged."]
+    lines += [words for each in found.spreads if (words := _chance(found, each))]
+    drawings = (spread_drawing(found),) if count else ()
+    return Section("Uncertainty of the patient's numbers", tuple(lines), tables=(table,),
+                   drawings=drawings)  # fmt: skip
+
+
+def _spread_row(found: Spreads, spread: Spread) -> Row:
+    measure = spread.measure
+    low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
+    place = found.strongest.get(measure.key)
+    return Row((
+        measure.label, "" if measure.unit == "1" else measure.shown_unit,
+        shown_text(measure, spread.base), middle, f"{low} to {high}",
+        label_of(place) if place else "-",
+    ))  # fmt: skip
+
+
+def _chance(found: Spreads, spread: Spread) -> str:
+    """Return in words how often a spring sits at a limit, "" for other measures."""
+    key, label = spread.measure.key, spread.measure.label
+    if key not in found.ranges:
+        return ""
+    low, high = found.ranges[key]
+    if low == high:
+        return f"{label} is prescribed: {low:g} N m/rad."
+    if spread.lower is None or spread.upper is None:
+        return ""
+    inside = 1.0 - spread.lower - spread.upper
+    parts = [(spread.upper, f"the stiffest ({high:g} N m/rad)"),
+             (spread.lower, f"the softest ({low:g} N m/rad)"),
+             (inside, "one between")]  # fmt: skip
+    told = ", ".join(f"{words} in {100 * share:.0f} %" for share, words in parts if share > 0.0)
+    return f"{label}: least effort takes {told} of the draws."

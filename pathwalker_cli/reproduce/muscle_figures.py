@@ -17,7 +17,6 @@ from pathwalker_cli.output.cycle import BOTH_SIDES, own_cycle
 from pathwalker_cli.output.figures.curves import CLINICAL_ANGLE, EXTENSION
 from pathwalker_cli.output.figures.style import (
     NEUTRAL,
-    PAGE,
     dress,
     legend,
     new_figure,
@@ -34,7 +33,7 @@ _DIRECTIONS: Final = ("extension", "flexion")
 _LOOK: Final = {"extension": _ORTHOSIS, "flexion": _BAREFOOT}
 _ANGLES: Final = {"hip": (-40.0, 115.0), "knee": (-20.0, 115.0), "ankle": (-60.0, 60.0)}
 """Flexion and dorsiflexion over which curves are drawn [deg]."""
-_TORQUE: Final = "muscle torque, extension + [N m]"
+_TORQUE: Final = "muscle torque [N m]"
 _LARGEST_SPEED: Final = 12.0
 """Angular velocity up to which curves are drawn [rad/s]."""
 
@@ -45,25 +44,24 @@ def curve_figure() -> Figure:
     Shares of the maximum isometric torque; flexion and dorsiflexion angles are positive, and so is
     the velocity of shortening.
     """
-    fig = new_figure(PAGE, 3.6)
-    grid = fig.subplots(2, 3, sharey="row")
+    fig = new_figure(4.4)
+    grid = fig.subplots(3, 2, sharey="col")
     by_name = {each.name: each for each in generators()}
     angle, speed = np.linspace(-2.0, 2.0, 401), np.linspace(-_LARGEST_SPEED, _LARGEST_SPEED, 401)
-    for column, joint in enumerate(LEG_JOINTS):
+    for row, joint in enumerate(LEG_JOINTS):
         for direction in _DIRECTIONS:
             generator, look = by_name[f"{joint}_{direction}_r"], _LOOK[direction]
             shown = CLINICAL_ANGLE[joint] * to_degrees(angle)
             force = np.array([float(generator.angle_factor(q)) for q in angle])
-            grid[0][column].plot(shown, force, **look)
+            grid[row][0].plot(shown, force, **look)
             velocity = generator.torque_sign * speed
             share = np.array([float(generator.velocity_factor(v)) for v in velocity])
-            grid[1][column].plot(speed, share, **look)
-        grid[0][column].set_xlim(*_ANGLES[joint])
+            grid[row][1].plot(speed, share, **look)
+        grid[row][0].set_xlim(*_ANGLES[joint])
         flexion = "dorsiflexion" if joint == "ankle" else "flexion"
-        dress(grid[0][column], joint.capitalize(), f"{flexion} [deg]",
-              "" if column else "torque-angle factor [1]")  # fmt: skip
-        dress(grid[1][column], "", "shortening velocity [rad/s]",
-              "" if column else "torque-velocity factor [1]")  # fmt: skip
+        title = joint.capitalize()
+        dress(grid[row][0], title, f"{flexion} [deg]", "torque-angle factor [1]")
+        dress(grid[row][1], title, "shortening velocity\n[rad/s]", "torque-velocity factor [1]")
     handles = [Line2D([], [], label=name, **_LOOK[name]) for name in _DIRECTIONS]  # type: ignore[arg-type]
     legend(fig, handles)
     return fig
@@ -78,11 +76,11 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
         barefoot: The gait without orthoses.
         orthosis: The gait with orthoses.
     """
-    fig = new_figure(PAGE, 4.0)
-    grid = fig.subplots(2, 3, sharex=True, sharey="col")
-    for row, side in enumerate(BOTH_SIDES):
-        for ax, joint in zip(grid[row], LEG_JOINTS, strict=True):
-            dress(ax, f"{side.capitalize()} {joint}", y="" if ax is not grid[row][0] else _TORQUE)
+    fig = new_figure(4.2)
+    grid = fig.subplots(3, 2, sharex=True, sharey="row")
+    for column, side in enumerate(BOTH_SIDES):
+        for ax, joint in zip(grid[:, column], LEG_JOINTS, strict=True):
+            dress(ax, f"{side.capitalize()} {joint}", y="" if column else _TORQUE)
             zero_line(ax)
             for series, look in ((barefoot, _BAREFOOT), (orthosis, _ORTHOSIS)):
                 for direction in _DIRECTIONS:
@@ -92,7 +90,7 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
             if joint == "ankle":
                 own = orthosis.orthosis_torque[:, BOTH_SIDES.index(side)]
                 _draw(ax, orthosis, side, own, {"color": NEUTRAL, "linewidth": 0.7})
-            percent_axis(ax, label=row == 1)
+            percent_axis(ax, *([] if joint == LEG_JOINTS[-1] else [""]))
     thin = Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis")
     legend(fig, [*_gait_handles(), thin])
     return fig
@@ -105,21 +103,20 @@ def activation_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
         barefoot: The gait without orthoses.
         orthosis: The gait with orthoses.
     """
-    fig = new_figure(PAGE, 5.2)
+    fig = new_figure(3.8)
     grid = fig.subplots(3, 4, sharex=True, sharey=True)
     columns = [(side, direction) for side in BOTH_SIDES for direction in _DIRECTIONS]
     for row, joint in zip(grid, LEG_JOINTS, strict=True):
         for ax, (side, direction) in zip(row, columns, strict=True):
             name = f"{joint}_{direction}_{SUFFIX[side]}"
             column = GENERATORS.index(name)
-            dress(ax, f"{side.capitalize()} {joint} {direction}",
+            dress(ax, f"{side.capitalize()} {joint}\n{direction}",
                   y="activation [1]" if (side, direction) == columns[0] else "")  # fmt: skip
             for series, look in ((barefoot, _BAREFOOT), (orthosis, _ORTHOSIS)):
                 thin = {**look, "linewidth": 0.6, "alpha": 0.7}
                 _draw(ax, series, side, series.excitation[:, column], thin)
                 _draw(ax, series, side, series.activation[:, column], look)
-            percent_axis(ax, label=joint == LEG_JOINTS[-1])
-            ax.set_xticks([0, 50, 100])
+            percent_axis(ax, "own cycle\n[%]" if joint == LEG_JOINTS[-1] else "")
     grid[0][0].set_ylim(-0.03, 1.05)
     thin_handle = Line2D([], [], color=NEUTRAL, linewidth=0.6, label="thin: excitation")
     legend(fig, [*_gait_handles(), thin_handle])

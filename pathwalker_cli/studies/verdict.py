@@ -79,13 +79,22 @@ class SpringVerdict:
     again: tuple[bool, bool] = (False, False)
 
     @property
+    def prescribed(self) -> bool:
+        """Whether the config leaves no choice."""
+        return self.range[0] == self.range[1]
+
+    @property
     def width(self) -> float:
-        """Share of the range that the region covers."""
+        """Share of the range that the region covers; 0 of a range without width."""
+        if self.prescribed:
+            return 0.0
         return (self.region[1] - self.region[0]) / (self.range[1] - self.range[0])
 
     @property
     def determined(self) -> str:
         """How well least effort determines the spring, in words."""
+        if self.prescribed:
+            return "prescribed"
         if any(self.again):
             return "not determined"
         if self.width <= _DETERMINED:
@@ -136,7 +145,7 @@ class Verdict:
     """All that is known about an identification.
 
     Args:
-        springs: Every free spring.
+        springs: Every spring, in the order of `conventions.STIFFNESSES`.
         stops: Every hard stop.
         snapped: The choice among real springs; None where the file lists none.
         optima: Other local optima within `SHARE` of the best.
@@ -181,7 +190,7 @@ def verdict_of(solution: GaitSolution) -> Verdict | None:
     judge = _Judge(resolver)
     if not judge.around.springs or not judge.optimum.converged:
         return None
-    springs = tuple(judge.spring(name) for name in judge.around.springs)
+    springs = tuple(map(judge.spring, STIFFNESSES))
     snapped = judge.snapped()
     near = [o for o in solution.optima if o.converged]
     best = min((o.cost for o in near), default=0.0)
@@ -244,9 +253,12 @@ class _Judge:
 
     def spring(self, name: str) -> SpringVerdict:
         """Return the verdict on one spring."""
-        which = self.around.springs.index(name)
         ranges = spring_ranges(self.optimum)
         stiffness = dict(zip(STIFFNESSES, self.optimum.stiffness.tolist(), strict=True))
+        if name not in self.around.springs:
+            only = (stiffness[name], stiffness[name])
+            return SpringVerdict(name, only[0], only, "", 0.0, 0.0, only, (True, True), True)
+        which = self.around.springs.index(name)
         size = abs(self.optimum.cost)
         gradient = float(self.around.cost_gradient[which]) / size
         curvature = self.around.curvature(name) / size

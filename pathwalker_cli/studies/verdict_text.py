@@ -7,14 +7,16 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import to_degrees
+from pathwalker_cli.conventions import STIFFNESSES, to_degrees
 from pathwalker_cli.studies.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, StopVerdict, Verdict
 
-__all__ = ["beaten_text", "per_degree", "reservations", "stop_text", "verdict_lines"]
+__all__ = ["PRESCRIBED", "beaten_text", "per_degree", "reservations", "stop_text", "verdict_lines"]
 
 _BEATEN: Final = 1e-3
 """Share of the cost by which real springs must be cheaper than the optimum to say so."""
+
+PRESCRIBED: Final = "prescribed by the config, not identified"
 
 _SOFTER: Final = {"lower": ("softer", -1.0), "upper": ("stiffer", 1.0)}
 
@@ -40,9 +42,11 @@ def per_degree(stiffness: float) -> float:
 
 def _spring(spring: SpringVerdict) -> str:
     low, high = spring.region
+    value = f"{spring.stiffness:.1f} N m/rad ({per_degree(spring.stiffness):.2f} N m/deg)"
+    if spring.prescribed:
+        return f"{value}: {PRESCRIBED}"
     text = (
-        f"{spring.stiffness:.1f} N m/rad ({per_degree(spring.stiffness):.2f} N m/deg): "
-        f"{spring.determined}; the cost stays within {100 * SHARE:g} % of the best from "
+        f"{value}: {spring.determined}; the cost stays within {100 * SHARE:g} % of the best from "
         f"{low:.1f} to {high:.1f} N m/rad ({per_degree(low):.2f} to {per_degree(high):.2f} "
         f"N m/deg), {100 * spring.width:.0f} % of the springs that are allowed"
     )
@@ -51,6 +55,8 @@ def _spring(spring: SpringVerdict) -> str:
 
 def reservations(spring: SpringVerdict) -> Iterator[str]:
     """Yield what to know of a spring beside its region: other optima, limits, doubts."""
+    if spring.prescribed:
+        return
     far = [end for end, again in zip(spring.range, spring.again, strict=True) if again]
     if far:
         ends = " and ".join(f"{end:.1f}" for end in far)
@@ -85,8 +91,11 @@ def _optima(verdict: Verdict) -> str:
     if not others:
         return text
     spread = []
-    for i, spring in enumerate(verdict.springs):
-        values = [optimum.stiffness[i] for optimum in verdict.optima]
+    for spring in verdict.springs:
+        if spring.prescribed:
+            continue
+        row = STIFFNESSES.index(spring.spring)
+        values = [optimum.stiffness[row] for optimum in verdict.optima]
         spread.append(f"{measure_of(spring.spring).label} {min(values):.0f} to {max(values):.0f}")
     return f"{text}, with {', '.join(spread)} N m/rad"
 

@@ -16,12 +16,12 @@ from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
     NEUTRAL,
-    PAGE,
     dress,
     events_handle,
     legend,
     new_figure,
     percent_axis,
+    side_handles,
     toe_off_line,
 )
 
@@ -37,16 +37,16 @@ def activations(series: GaitSeries, reference: Reference | None = None) -> Figur
         series: The stride.
         reference: Not used: activations are not recorded.
     """
-    fig = new_figure(PAGE, 5.6)
+    fig = new_figure(4.6)
     grid = fig.subplots(4, 4, sharex=True, sharey=True)
     columns = tuple(product(BOTH_SIDES, _DIRECTIONS))
     for row, joint in zip(grid, LEG_JOINTS, strict=False):
         for ax, (side, direction) in zip(row, columns, strict=True):
             name = f"{joint}_{direction}_{SUFFIX[side]}"
-            _draw(ax, series, name, side, f"{side.capitalize()} {joint} {direction}")
+            _draw(ax, series, name, side, f"{side.capitalize()} {joint}\n{direction}")
     for ax, title, name in zip(
         grid[-1],
-        ("Trunk, bends forward", "Trunk, extends"),
+        ("Trunk\nforward", "Trunk\nbackward"),
         ("lumbar_extension", "lumbar_flexion"),
         strict=False,
     ):
@@ -55,7 +55,7 @@ def activations(series: GaitSeries, reference: Reference | None = None) -> Figur
     legend(
         fig,
         [
-            Line2D([], [], color=NEUTRAL, linewidth=1.4, label="activation (left side dashed)"),
+            *side_handles(),
             Line2D([], [], color=NEUTRAL, linewidth=0.6, label="thin: excitation"),
             events_handle(),
         ],
@@ -81,13 +81,12 @@ def _draw(ax: Axes, series: GaitSeries, name: str, side: Side, title: str) -> No
 def _label(grid: list[list[Axes]]) -> None:
     """Label the outer axes and clear the two panels without a generator."""
     for row in grid:
-        row[0].set_ylabel("activation [1]")
+        row[0].set_ylabel("activation [1]", labelpad=2.0)
     for top, ax in zip(grid[-2][2:], grid[-1][2:], strict=True):
         ax.axis("off")
-        percent_axis(top)
+        percent_axis(top, "own cycle\n[%]")
         top.xaxis.set_tick_params(labelbottom=True)
     for ax in grid[-1][:2]:
-        percent_axis(ax)
-        ax.set_xlabel("right gait cycle [%]")
+        percent_axis(ax, "right cycle\n[%]")
     grid[0][0].set_ylim(-0.03, 1.05)
     grid[0][0].set_yticks([0.0, 0.5, 1.0])

@@ -21,8 +21,6 @@ from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
     NEUTRAL,
-    PAGE,
-    SMALL,
     dress,
     legend,
     new_figure,
@@ -49,11 +47,11 @@ def orthosis_curves(series: GaitSeries, reference: Reference | None = None) -> F
     """
     if series.walker.orthosis is None:
         raise InputError("a barefoot walker has no orthosis curve", allowed="condition orthosis")
-    fig = new_figure(PAGE, 2.9)
+    fig = new_figure(2.4)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
     for i, (ax, side) in enumerate(zip(panels, BOTH_SIDES, strict=True)):
         _draw_orthosis(ax, series, side, series.walker.orthosis[i])
-        dress(ax, f"{side.capitalize()} orthosis", _ANGLE, _TORQUE if i == 0 else "")
+        dress(ax, _title(series, side), _ANGLE, _TORQUE if i == 0 else "")
     legend(
         fig,
         [
@@ -82,17 +80,16 @@ def _draw_orthosis(ax: Axes, series: GaitSeries, side: Side, orthosis: OrthosisS
         ax.plot(-to_degrees(span), torque, color=colour, **look)
     for stop in stops:
         ax.axvline(-float(to_degrees(stop)), color=NEUTRAL, linewidth=0.8, linestyle="-.")
-    lines = [
-        f"$K_{n}$ = {k:.1f} N m/rad\n= {np.deg2rad(k):.2f} N m/deg"
-        for n, k in (("D", k_d), ("P", k_p))
-    ]
-    place: dict[str, Any] = {
-        "transform": ax.transAxes,
-        "ha": "right",
-        "va": "bottom",
-        "fontsize": SMALL,
-    }
-    ax.text(0.98, 0.03, "\n".join(lines), **place)
+
+
+def _title(series: GaitSeries, side: Side) -> str:
+    """Return the side with its stiffnesses in both units."""
+    i = BOTH_SIDES.index(side)
+    k_d, k_p = (float(series.stiffness[row]) for row in (i, i + 2))
+    return (
+        f"{side.capitalize()} orthosis\nK_D {k_d:.1f}, K_P {k_p:.1f} N m/rad\n"
+        f"({np.deg2rad(k_d):.2f}, {np.deg2rad(k_p):.2f} N m/deg)"
+    )
 
 
 def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figure:
@@ -105,7 +102,7 @@ def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figu
         series: The stride.
         reference: Not used.
     """
-    fig = new_figure(PAGE, 2.9)
+    fig = new_figure(2.4)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
     for i, (ax, side) in enumerate(zip(panels, BOTH_SIDES, strict=True)):
         _draw_profile(ax, series, side)
@@ -134,5 +131,5 @@ def _draw_profile(ax: Axes, series: GaitSeries, side: Side) -> None:
     ax.plot(to_degrees(angle), thick, linewidth=1.6, **look)
     ends = np.array([angle[bearing].min(), angle[bearing].max()])
     ax.plot(to_degrees(ends), offset + slope * ends, color="black", linewidth=0.8, linestyle=":")
-    text = f"{slope:.0f} N m/rad\n= {np.deg2rad(slope):.2f} N m/deg"
-    ax.text(0.03, 0.97, text, transform=ax.transAxes, va="top", fontsize=SMALL)
+    text = f"{slope:.0f} N m/rad\n({np.deg2rad(slope):.2f} N m/deg)"
+    ax.text(0.03, 0.97, text, transform=ax.transAxes, va="top")

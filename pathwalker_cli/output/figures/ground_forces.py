@@ -11,7 +11,6 @@ from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.output.figures.curves import Reference, draw_band, draw_sides
 from pathwalker_cli.output.figures.style import (
-    PAGE,
     band_handle,
     dress,
     events_handle,
@@ -38,7 +37,7 @@ def ground_forces(series: GaitSeries, reference: Reference | None = None) -> Fig
         reference: Recorded bands to draw behind.
     """
     bands, factor = reference.forces if reference else {}, 100.0 / series.walker.weight
-    fig = new_figure(PAGE, 2.6)
+    fig = new_figure(2.1)
     for ax, (axis, (title, label)) in zip(fig.subplots(1, 2), _PANELS.items(), strict=True):
         for side in BOTH_SIDES:
             draw_band(ax, bands.get(f"foot_{SUFFIX[side]}_{axis}"), side, factor)

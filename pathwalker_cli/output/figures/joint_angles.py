@@ -16,12 +16,10 @@ from pathwalker_cli.output.figures.curves import (
     draw_sides,
 )
 from pathwalker_cli.output.figures.style import (
-    NEUTRAL,
-    PAGE,
-    SMALL,
     band_handle,
     dress,
     events_handle,
+    legend_panel,
     new_figure,
     percent_axis,
     side_handles,
@@ -49,8 +47,8 @@ def joint_angles(series: GaitSeries, reference: Reference | None = None) -> Figu
         reference: Recorded bands to draw behind.
     """
     bands = reference.angles if reference else {}
-    fig = new_figure(PAGE, 4.0)
-    panels = fig.subplots(2, 3).ravel()
+    fig = new_figure(3.9)
+    panels = fig.subplots(3, 2).ravel()
     for ax, (joint, (title, label)) in zip(panels, _PANELS.items(), strict=False):
         sign, values = CLINICAL_ANGLE.get(joint, 1.0), {}
         for side in BOTH_SIDES:
@@ -63,14 +61,5 @@ def joint_angles(series: GaitSeries, reference: Reference | None = None) -> Figu
         draw_sides(ax, series, values)
         percent_axis(ax)
     handles = [*side_handles(), events_handle(), *([band_handle()] if bands else [])]
-    panels[-1].axis("off")
-    panels[-1].legend(handles=handles, loc="upper left", frameon=False, handlelength=2.6)
-    panels[-1].text(
-        0.04,
-        0.05,
-        "Each side from its own\nfoot strike to its next one.",
-        transform=panels[-1].transAxes,
-        fontsize=SMALL,
-        color=NEUTRAL,
-    )
+    legend_panel(panels[-1], handles)
     return fig

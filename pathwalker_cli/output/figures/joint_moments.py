@@ -16,11 +16,10 @@ from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
     NEUTRAL,
-    PAGE,
     band_handle,
     dress,
     events_handle,
-    legend,
+    legend_panel,
     new_figure,
     percent_axis,
     side_handles,
@@ -47,8 +46,9 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
         reference: Recorded bands to draw behind.
     """
     bands, mass = reference.moments if reference else {}, series.walker.total_mass
-    fig = new_figure(PAGE, 2.5)
-    for ax, (joint, title) in zip(fig.subplots(1, 3), _TITLES.items(), strict=True):
+    fig = new_figure(2.9)
+    panels = fig.subplots(2, 2).ravel()
+    for ax, (joint, title) in zip(panels, _TITLES.items(), strict=False):
         factor, values = EXTENSION[joint] / mass, {}
         for side in BOTH_SIDES:
             name = f"{joint}_{SUFFIX[side]}"
@@ -63,7 +63,7 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
     handles = [*side_handles(), events_handle(), *([band_handle()] if bands else [])]
     if series.walker.orthosis:
         handles.append(Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis alone"))
-    legend(fig, handles)
+    legend_panel(panels[-1], handles)
     return fig
 
 

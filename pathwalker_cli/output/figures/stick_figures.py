@@ -21,7 +21,6 @@ from pathwalker_cli.output.figures.style import (
     FORCE_COLOUR,
     FORCE_LENGTH,
     NEUTRAL,
-    PAGE,
     dress,
     legend,
     new_figure,
@@ -34,8 +33,8 @@ _ROWS: Final = ((0, 10, 20, 30, 40), (50, 60, 70, 80, 90))
 _SPACING: Final = 1.05
 """Distance from figure to figure, as a share of the pelvis height."""
 _LEG_LOOK: Final[dict[Side, dict[str, Any]]] = {
-    "right": {"color": BODY_COLOUR["right"], "linestyle": "-", "linewidth": 1.8, "zorder": 3},
-    "left": {"color": BODY_COLOUR["left"], "linestyle": "--", "linewidth": 1.5, "zorder": 2},
+    "right": {"color": BODY_COLOUR["right"], "linestyle": "-", "linewidth": 1.3, "zorder": 3},
+    "left": {"color": BODY_COLOUR["left"], "linestyle": "--", "linewidth": 1.1, "zorder": 2},
 }
 
 
@@ -46,7 +45,7 @@ def stick_figures(series: GaitSeries, reference: Reference | None = None) -> Fig
         series: The stride.
         reference: Not used.
     """
-    fig = new_figure(PAGE, 5.6)
+    fig = new_figure(3.5)
     for ax, row in zip(fig.subplots(2, 1), _ROWS, strict=True):
         _draw_row(ax, series, row)
     legend(
@@ -58,7 +57,7 @@ def stick_figures(series: GaitSeries, reference: Reference | None = None) -> Fig
                 [],
                 color=FORCE_COLOUR,
                 linewidth=1.4,
-                label="ground force, 1 body weight as long as 0.6 pelvis heights",
+                label=f"ground force; 1 body weight is as\nlong as {FORCE_LENGTH:g} pelvis heights",
             ),
         ],
     )
@@ -103,12 +102,12 @@ def _draw_body(ax: Axes, points: dict[str, np.ndarray]) -> None:
         s, look = SUFFIX[side], _LEG_LOOK[side]
         _draw_chain(ax, points, ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}"), look)
         foot = (f"ankle_{s}", f"heel_{s}", f"toe_{s}", f"ankle_{s}")
-        _draw_chain(ax, points, foot, look | {"linewidth": 1.0})
-    trunk = {"color": BODY_COLOUR["right"], "linewidth": 2.2, "zorder": 4}
+        _draw_chain(ax, points, foot, look | {"linewidth": 0.8})
+    trunk = {"color": BODY_COLOUR["right"], "linewidth": 1.6, "zorder": 4}
     _draw_chain(ax, points, ("lumbar", "neck"), trunk)
     radius = float(np.linalg.norm(points["head"] - points["neck"]))
     ax.add_patch(
-        Circle(tuple(points["head"]), radius, fill=False, color=BODY_COLOUR["right"], linewidth=1.2)
+        Circle(tuple(points["head"]), radius, fill=False, color=BODY_COLOUR["right"], linewidth=0.9)
     )
 
 
@@ -131,6 +130,6 @@ def _draw_force(ax: Axes, x: float, arrow: np.ndarray) -> None:
         angles="xy",
         scale_units="xy",
         scale=1.0,
-        width=0.004,
+        width=0.006,
         zorder=5,
     )

@@ -23,26 +23,24 @@ __all__ = [
     "LINE_STYLE",
     "MARKER",
     "NEUTRAL",
-    "NORMAL",
-    "PAGE",
-    "SMALL",
     "STYLE",
+    "TEXT",
     "band_handle",
     "dress",
     "events_handle",
     "legend",
+    "legend_panel",
     "new_figure",
     "percent_axis",
     "side_handles",
-    "small_labels",
     "toe_off_line",
     "zero_line",
 ]
 
-PAGE: Final = 7.0
-"""Width of a printed page [in]."""
 COLUMN: Final = 3.35
-"""Width of a printed column [in]: 85 mm."""
+"""Width of every figure [in]: a column of a journal, 85 mm."""
+TEXT: Final = 7.0
+"""Size of all text [pt]; figures are printed as wide as they are drawn."""
 
 LINE_COLOUR: Final[dict[Side, str]] = {"right": "#0072B2", "left": "#D55E00"}
 """Blue and vermilion of the palette by Okabe and Ito, told apart with any colour vision."""
@@ -59,21 +57,17 @@ FORCE_LENGTH: Final = 0.6
 NEUTRAL: Final = "#555555"
 """Grey of everything that belongs to no side."""
 
-SMALL: Final = 7.0
-NORMAL: Final = 8.0
-"""Font sizes [pt]; nothing is smaller than 7 pt at printed width."""
-
 STYLE: Final[dict[Any, Any]] = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Arial", "Helvetica"],
-    "font.size": NORMAL,
-    "axes.titlesize": NORMAL,
-    "axes.labelsize": NORMAL,
-    "xtick.labelsize": SMALL,
-    "ytick.labelsize": SMALL,
-    "legend.fontsize": SMALL,
+    "font.size": TEXT,
+    "axes.titlesize": TEXT,
+    "axes.labelsize": TEXT,
+    "xtick.labelsize": TEXT,
+    "ytick.labelsize": TEXT,
+    "legend.fontsize": TEXT,
     "axes.linewidth": 0.6,
-    "lines.linewidth": 1.4,
+    "lines.linewidth": 1.2,
     "lines.dashed_pattern": (3.2, 1.4),
     "figure.dpi": 100,
     "svg.hashsalt": "pathwalker",
@@ -82,33 +76,30 @@ STYLE: Final[dict[Any, Any]] = {
 """Settings of Matplotlib under which figures are made and saved."""
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of this size [in]."""
-    return Figure(figsize=(width, height), layout="constrained")
+def new_figure(height: float) -> Figure:
+    """Return an empty figure of this height [in], as wide as a column."""
+    return Figure(figsize=(COLUMN, height), layout="constrained")
 
 
 def dress(ax: Axes, title: str = "", x: str = "", y: str = "") -> None:
-    """Give axes their title and labels and the common look of spines, ticks and grid."""
+    """Give axes their title and labels and the common look of spines, ticks and grid.
+
+    The unit of y stands in a line of its own, since panels are low.
+    """
     ax.set_title(title)
     ax.set_xlabel(x)
-    ax.set_ylabel(y)
+    ax.set_ylabel(y.replace(" [", "\n["))
     ax.spines[["top", "right"]].set_visible(False)
-    ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
+    ax.tick_params(width=0.6, length=2.5)
     ax.grid(visible=True, linewidth=0.4, color="#dddddd")
     ax.set_axisbelow(True)
 
 
-def small_labels(ax: Axes) -> None:
-    """Let title and labels be as small as the ticks, for panels that share a column."""
-    for text in (ax.title, ax.xaxis.label, ax.yaxis.label):
-        text.set_fontsize(SMALL)
-
-
-def percent_axis(ax: Axes, label: bool = True) -> None:
+def percent_axis(ax: Axes, label: str = "own gait cycle [%]") -> None:
     """Let the x axis run over a gait cycle that begins with the side's own foot strike."""
     ax.set_xlim(0.0, 100.0)
-    ax.set_xticks([0, 25, 50, 75, 100])
-    ax.set_xlabel("own gait cycle [%]" if label else "")
+    ax.set_xticks([0, 50, 100])
+    ax.set_xlabel(label)
 
 
 def toe_off_line(ax: Axes, cycle: OwnCycle) -> None:
@@ -136,16 +127,22 @@ def events_handle() -> Artist:
 
 def band_handle() -> Artist:
     """Return the legend entry of the recorded range."""
-    return Patch(facecolor="#bbbbbb", alpha=0.6, label="recorded: range, thin line: mean")
+    return Patch(facecolor="#bbbbbb", alpha=0.6, label="recorded:\nrange, mean")
 
 
-def legend(fig: Figure, handles: Iterable[Artist], columns: int = 0) -> None:
-    """Put one legend above all axes, in a row unless a number of columns is given."""
-    entries = list(handles)
-    fig.legend(
-        handles=entries,
-        loc="outside upper center",
-        ncols=columns or len(entries),
-        frameon=False,
-        handlelength=2.6,
-    )
+def legend(fig: Figure, handles: Iterable[Artist], columns: int = 2) -> None:
+    """Put one legend above all axes."""
+    fig.legend(handles=list(handles), loc="outside upper center", ncols=columns, **_LEGEND)
+
+
+def legend_panel(ax: Axes, handles: Iterable[Artist]) -> None:
+    """Let a panel that is not needed hold the legend of the figure."""
+    ax.axis("off")
+    place = (-0.35, 1.0)  # room that labels of an axis would have
+    box = ax.legend(handles=list(handles), loc="upper left", bbox_to_anchor=place, **_LEGEND)
+    box.set_in_layout(False)  # else all panels shrink with it
+
+
+_LEGEND: Final[dict[str, Any]] = {
+    "frameon": False, "handlelength": 2.0, "handletextpad": 0.6, "columnspacing": 1.2,
+}  # fmt: skip

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from textwrap import fill
 from typing import Any, Final
 
 import matplotlib as mpl
@@ -14,14 +16,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
-from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.output.figures.save import save_formats
-from pathwalker_cli.output.figures.style import PAGE, SMALL, STYLE, new_figure
+from pathwalker_cli.output.figures.style import STYLE, legend, legend_panel, new_figure
+from pathwalker_cli.patient_blocks import SpringSet
 from pathwalker_cli.studies.landscape.result import Landscape
 from pathwalker_cli.studies.measures import measure_of
 
-__all__ = ["landscape_figure", "save_landscape_figure"]
+__all__ = ["Chosen", "cost_figure", "landscape_figure", "save_landscape_figure"]
+
+Chosen = Mapping[Side, tuple[float, float]]
+"""K_D and K_P by side [N m/rad]."""
 
 _LEVELS: Final = (0.0, 1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0)
 """Limits of the colours [%]; what is above belongs to the last one."""
@@ -31,6 +37,9 @@ _COLOURS: Final = "cividis_r"
 
 _LOGARITHMIC: Final = 5.0
 """Ratio of the ends of an axis from which on it is drawn logarithmically."""
+
+_TITLE: Final = 22
+"""Characters of the longest line of a small title."""
 
 _FLAT: Final = 1e-3
 """Relative span of a measure below which it counts as the same everywhere."""
@@ -43,18 +52,54 @@ def landscape_figure(landscape: Landscape) -> Figure:
         landscape: The landscape.
     """
     with mpl.rc_context(STYLE):
-        fig = new_figure(PAGE, 4.0)
-        panels = fig.subplot_mosaic([["cost", "a"], ["cost", "b"], ["cost", "c"]],
-                                    width_ratios=[2.3, 1.0])  # fmt: skip
+        fig = new_figure(5.9)
+        panels = fig.subplot_mosaic([["cost", "cost"], ["a", "b"], ["c", "legend"]],
+                                    height_ratios=[2.1, 1.0, 1.0])  # fmt: skip
         _draw_cost(fig, panels["cost"], landscape)
         side = "right" if landscape.side == "both" else landscape.side
         keys = ("walking_speed", f"min_stance_knee_flexion_{side}", f"step_length_{side}")
         for name, key in zip("abc", keys, strict=True):
-            _draw_measure(fig, panels[name], landscape, key, name == "c")
+            _draw_measure(fig, panels[name], landscape, key)
         for artist in (*panels["cost"].lines, *panels["cost"].collections):
             artist.set_in_layout(False)  # marks on the edge would push all axes away from it
-        fig.legend(handles=_handles(landscape), loc="outside lower center", ncols=3, frameon=False)
+        legend_panel(panels["legend"], _handles(landscape))
     return fig
+
+
+def cost_figure(landscape: Landscape, springs: SpringSet | None, chosen: Chosen) -> Figure:
+    """Return the cost alone, with the springs that can be bought at the edges of the plane.
+
+    Args:
+        landscape: The landscape.
+        springs: Springs that exist, or None.
+        chosen: K_D and K_P of the real springs to take by side [N m/rad]; empty if nothing chose.
+    """
+    with mpl.rc_context(STYLE):
+        fig = new_figure(3.5)
+        ax = fig.subplots()
+        _draw_cost(fig, ax, landscape)
+        handles = _handles(landscape)
+        if springs is not None:
+            _mark_real(ax, springs)
+            handles.append(Line2D([], [], linestyle="none", label="real springs", **_REAL_D))
+        for k_d, k_p in chosen.values():
+            ax.plot(k_d, k_p, linestyle="none", clip_on=False, zorder=6, **_SQUARE)
+        if chosen:
+            handles.append(Line2D([], [], linestyle="none", label="to take", **_SQUARE))
+        for artist in (*ax.lines, *ax.collections):
+            artist.set_in_layout(False)
+        legend(fig, handles)
+    return fig
+
+
+def _mark_real(ax: Axes, springs: SpringSet) -> None:
+    """Mark the springs that exist: K_D at the upper edge, K_P at the right one."""
+    (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+    look: dict[str, Any] = {"linestyle": "none", "clip_on": False, "zorder": 4}
+    k_d = [s.stiffness for s in springs.dorsiflexion if left <= s.stiffness <= right]
+    k_p = [s.stiffness for s in springs.plantarflexion if low <= s.stiffness <= high]
+    ax.plot(k_d, [high] * len(k_d), **_REAL_D, **look)
+    ax.plot([right] * len(k_p), k_p, **_REAL_P, **look)
 
 
 def save_landscape_figure(folder: Path, landscape: Landscape) -> None:
@@ -99,7 +144,7 @@ def _mark(ax: Axes, landscape: Landscape) -> None:
     for side, (k_d, k_p) in _article(landscape).items():
         ax.plot(k_d, k_p, **_DIAMOND, **look, zorder=5)
         if landscape.side == "both":
-            ax.annotate(side, (k_d, k_p), (4, 4), textcoords="offset points", fontsize=SMALL)
+            ax.annotate(side, (k_d, k_p), (4, 4), textcoords="offset points")
 
 
 def _article(landscape: Landscape) -> dict[str, tuple[float, float]]:
@@ -113,22 +158,19 @@ def _article(landscape: Landscape) -> dict[str, tuple[float, float]]:
     return found
 
 
-def _draw_measure(fig: Figure, ax: Axes, landscape: Landscape, key: str, bottom: bool) -> None:
+def _draw_measure(fig: Figure, ax: Axes, landscape: Landscape, key: str) -> None:
     """Draw one measure of the best local optima over the plane."""
     measure = measure_of(key)
     values = np.ma.masked_invalid(np.vectorize(measure.shown)(landscape.values(key)).T)
     if np.ptp(values.compressed()) <= _FLAT * abs(values.mean()):
         ax.set_facecolor("#eeeeee")
-        ax.text(0.5, 0.5, f"{values.mean():.3g} {measure.shown_unit} everywhere", ha="center",
-                va="center", transform=ax.transAxes, fontsize=SMALL)  # fmt: skip
+        ax.text(0.5, 0.5, f"{values.mean():.3g} {measure.shown_unit}\neverywhere", ha="center",
+                va="center", transform=ax.transAxes)  # fmt: skip
     else:
         filled = ax.contourf(landscape.k_d, landscape.k_p, values, levels=7, cmap=_COLOURS)
         fig.colorbar(filled, ax=ax, pad=0.02, aspect=12).locator = mpl.ticker.MaxNLocator(4)
     _plane(ax, landscape, small=True)
-    ax.set_title(f"{measure.label} [{measure.shown_unit}]", fontsize=SMALL)
-    if not bottom:
-        ax.set_xlabel("")
-        ax.tick_params(labelbottom=False)
+    ax.set_title(fill(f"{measure.label} [{measure.shown_unit}]", _TITLE))
 
 
 def _plane(ax: Axes, landscape: Landscape, small: bool = False) -> None:
@@ -139,14 +181,14 @@ def _plane(ax: Axes, landscape: Landscape, small: bool = False) -> None:
     ):
         logarithmic = values[0] > 0.0 and values[-1] / values[0] >= _LOGARITHMIC
         set_scale("log" if logarithmic else "linear")
-        ticks = values[[0, values.size // 2, -1]] if small else values
+        ticks = np.unique(values[[0, values.size // 2, -1]]) if small else values
         axis.set_major_locator(FixedLocator(ticks.tolist()))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
         axis.set_minor_formatter(NullFormatter())
-        axis.set_label_text(f"$K_{name}$ [N m/rad]")
+        axis.set_label_text(f"K_{name} [N m/rad]")
     ax.set(xlim=landscape.k_d[[0, -1]], ylim=landscape.k_p[[0, -1]])
-    ax.tick_params(labelsize=SMALL, width=0.6, length=2.5)
+    ax.tick_params(width=0.6, length=2.5)
 
 
 _DOT: Final[dict[str, Any]] = {
@@ -163,6 +205,15 @@ _CROSS: Final[dict[str, Any]] = {
     "markersize": 6.0,
     "markeredgewidth": 1.5,
 }
+_REAL_D: Final[dict[str, Any]] = {
+    "marker": 7, "color": "#009E73", "markersize": 6.0, "markeredgecolor": "black",
+    "markeredgewidth": 0.5,
+}  # fmt: skip
+_REAL_P: Final[dict[str, Any]] = {**_REAL_D, "marker": 4}
+_SQUARE: Final[dict[str, Any]] = {
+    "marker": "s", "color": "#009E73", "markersize": 10.0, "fillstyle": "none",
+    "markeredgewidth": 1.6,
+}  # fmt: skip
 _STAR: Final[dict[str, Any]] = {
     "marker": "*", "color": "#D55E00", "markersize": 13.0, "markeredgecolor": "white",
 }  # fmt: skip
@@ -175,9 +226,9 @@ def _handles(landscape: Landscape) -> list[Artist]:
     """Return the legend entries of what is in the figure."""
     entries: list[tuple[dict[str, Any], str, bool]] = [
         (_STAR, "least cost found", True),
-        (_DIAMOND, "identified in the article", bool(_article(landscape))),
+        (_DIAMOND, "identified\nin the article", bool(_article(landscape))),
         (_DOT, "solved", True),
-        (_RING, "several local optima, best shown", bool(landscape.branched)),
+        (_RING, "several local optima,\nbest shown", bool(landscape.branched)),
         (_CROSS, "no solution", bool(landscape.failed)),
     ]
     found: list[Artist] = [
@@ -185,6 +236,6 @@ def _handles(landscape: Landscape) -> list[Artist]:
         for marker, label, there in entries
         if there
     ]
-    text = f"at most {100 * landscape.tolerance:g} % above the least"
+    text = f"at most {100 * landscape.tolerance:g} % above\nthe least"
     return [Patch(facecolor="none", edgecolor="black", hatch="///", linewidth=1.5, label=text),
             *found]  # fmt: skip

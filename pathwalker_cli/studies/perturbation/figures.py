@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import Final
 
 import matplotlib as mpl
@@ -17,8 +18,6 @@ from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     MARKER,
     NEUTRAL,
-    PAGE,
-    SMALL,
     STYLE,
     dress,
     legend,
@@ -30,6 +29,8 @@ from pathwalker_cli.studies.perturbation.text import paper_changes
 
 __all__ = ["perturbation_figure", "save_perturbation_figure"]
 
+_TITLE: Final = 20
+"""Characters of the longest line of a title."""
 _LEAST_SPAN: Final = 0.02
 """Least width of an axis [%]: smaller changes are none."""
 
@@ -42,11 +43,11 @@ def save_perturbation_figure(result: Perturbation, folder: Path) -> None:
 def perturbation_figure(result: Perturbation) -> Figure:
     """Return one panel per measure with the change [%] for every spring that was moved."""
     with mpl.rc_context(STYLE):
-        fig = new_figure(PAGE, 1.6 + 0.55 * len(result.rows))
-        panels = fig.subplots(2, 3, sharey=True)
+        fig = new_figure(2.4 + 0.95 * len(result.rows))
+        panels = fig.subplots(3, 2, sharey=True)
         for ax, key in zip(panels.flat, COMPARED, strict=True):
             _draw(ax, result, key)
-            dress(ax, measure_of(key).label, "change [%]")
+            dress(ax, fill(measure_of(key).label, _TITLE), "change [%]")
             ax.grid(visible=False, axis="y")
         ax = panels[0, 0]
         ax.set_yticks(range(len(result.rows)), [_label(result, row) for row in result.rows])
@@ -58,7 +59,7 @@ def perturbation_figure(result: Perturbation) -> Figure:
 def _label(result: Perturbation, row: Perturbed) -> str:
     """Return the name of a spring with both its stiffnesses."""
     symbol, side = measure_of(row.spring).label.split()
-    name = f"${symbol[0]}_{symbol[-1]}$ {side}, {100.0 * (row.factor - 1.0):+.3g} %"
+    name = f"{symbol} {side}, {100.0 * (row.factor - 1.0):+.3g} %"
     return f"{name}\n{result.base[row.spring]:.3g} to {row.stiffness:.3g} N m/rad"
 
 
@@ -80,8 +81,7 @@ def _draw(ax: Axes, result: Perturbation, key: str) -> None:
             shown.append(x)
     room = max(max(shown) - min(shown), _LEAST_SPAN)
     ax.set_xlim(min(shown) - 0.1 * room, max(shown) + 0.1 * room)
-    ax.locator_params(axis="x", nbins=5)
-    ax.tick_params(labelsize=SMALL)
+    ax.locator_params(axis="x", nbins=3)
 
 
 def _handles(result: Perturbation) -> list[Artist]:
@@ -94,6 +94,6 @@ def _handles(result: Perturbation) -> list[Artist]:
     if any(paper_changes(result, row) for row in result.rows):
         handles.append(
             Line2D([], [], color="black", marker="D", markersize=4.5, mfc="none", linewidth=0,
-                   label="article, table 5 (another optimum)")
+                   label="article, table 5\n(another optimum)")
         )  # fmt: skip
     return handles

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pathwalker_cli.output.figures.save import save_formats
-from pathwalker_cli.output.figures.style import NEUTRAL, PAGE, STYLE, dress, new_figure
+from pathwalker_cli.output.figures.style import NEUTRAL, STYLE, dress, new_figure
 from pathwalker_cli.studies.measures import measure_of
 from pathwalker_cli.studies.sensitivity.result import Sensitivities
 from pathwalker_cli.studies.sensitivity.text import label_of
@@ -25,7 +25,7 @@ _PANELS: Final = (
     "step_length_left",
     "stride_time",
 )
-_BARS: Final = 8
+_BARS: Final = 6
 """Numbers shown per panel, the strongest ones."""
 
 _MORE: Final = "#009E73"
@@ -35,8 +35,8 @@ _LESS: Final = "#CC79A7"
 
 def sensitivity_figure(result: Sensitivities) -> Figure:
     """Return the strongest elasticities of cost, crouch, steps and stride time as bars."""
-    fig = new_figure(PAGE, 5.4)
-    for axes, key in zip(fig.subplots(3, 2).ravel(), _PANELS, strict=True):
+    fig = new_figure(7.6)
+    for axes, key in zip(fig.subplots(6, 1), _PANELS, strict=True):
         values = {row.place: row.elasticities.get(key) or 0.0 for row in result.rows}
         strongest = sorted(values, key=lambda place: -abs(values[place]))[:_BARS][::-1]
         numbers = np.array([values[place] for place in strongest])
@@ -48,7 +48,8 @@ def sensitivity_figure(result: Sensitivities) -> Figure:
         )  # fmt: skip
         axes.set_yticks(range(len(strongest)), [label_of(place) for place in strongest])
         axes.axvline(0.0, color=NEUTRAL, linewidth=0.6)
-        dress(axes, measure_of(key).label, "elasticity [% per %]")
+        dress(axes, measure_of(key).label)
+    axes.set_xlabel("elasticity [% per %]")
     return fig
 
 

@@ -19,10 +19,9 @@ from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
     NEUTRAL,
-    PAGE,
-    SMALL,
     STYLE,
     dress,
+    legend,
     new_figure,
 )
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
@@ -43,16 +42,15 @@ def tradeoff_figure(tradeoff: Tradeoff) -> Figure:
     """
     springs = tradeoff.condition == "orthosis"
     with mpl.rc_context(STYLE):
-        fig = new_figure(PAGE if springs else 0.5 * PAGE, 3.3)
-        panels = fig.subplots(1, 2 if springs else 1, squeeze=False)[0]
+        rows = 2 if springs else 1
+        fig = new_figure(0.5 + 2.0 * rows)
+        panels = fig.subplots(rows, 1, squeeze=False)[:, 0]
         _draw_front(panels[0], tradeoff)
         dress(panels[0], "What speed costs", _SPEED, "effort per distance [s/m]")
         if springs:
             _draw_springs(panels[1], tradeoff.front)
             dress(panels[1], "Springs along the front", _SPEED, "stiffness [N m/rad]")
-        columns = 4 if springs else 2
-        fig.legend(handles=_handles(tradeoff), loc="outside upper center", ncols=columns,
-                   frameon=False, handlelength=2.6)  # fmt: skip
+        legend(fig, _handles(tradeoff))
     return fig
 
 
@@ -77,10 +75,12 @@ def _draw_front(ax: Axes, tradeoff: Tradeoff) -> None:
     ax.plot([p.speed for p in beaten], [p.effort for p in beaten], **_BEATEN)
     coarse = [p for p in tradeoff.solved if p.mesh_status == "inaccurate"]
     ax.plot([p.speed for p in coarse], [p.effort for p in coarse], **_COARSE)
-    for point, text in labels(tradeoff.solved):
-        ax.annotate(text, (point.speed, point.effort), (5, -3), textcoords="offset points",
-                    va="top", fontsize=SMALL)  # fmt: skip
-    ax.margins(x=0.08, y=0.1)
+    # in turn below and above, since points may be near one another
+    for i, (point, text) in enumerate(labels(tradeoff.solved)):
+        place: dict[str, Any] = {"ha": ("left", "right")[i % 2], "va": ("top", "bottom")[i % 2]}
+        ax.annotate(text, (point.speed, point.effort), ((3, -3), (-3, 3))[i % 2],
+                    textcoords="offset points", **place)  # fmt: skip
+    ax.margins(x=0.08, y=0.15)
 
 
 def labels(points: Sequence[FrontPoint]) -> list[tuple[FrontPoint, str]]:
@@ -144,6 +144,6 @@ def _handles(tradeoff: Tradeoff) -> list[Artist]:
         found.append(Patch(facecolor="#bbbbbb", alpha=0.5, label="recorded speeds"))
     if tradeoff.condition == "orthosis":
         for name in STIFFNESSES:
-            label = f"$K_{name[0].upper()}$ {name.split('_')[2]}"
+            label = f"K_{name[0].upper()} {name.split('_')[2]}"
             found.append(Line2D([], [], **_spring(name), label=label))
     return found

@@ -74,6 +74,7 @@ class Tradeoff:
         condition: Condition that it is about.
         points: The points, by rising weight.
         base_weight: Weight of the run that the study began with.
+        optimum: Cost and walking speed of that run, SI units.
         recorded: Least and largest recorded speed in that condition [m/s]; None without any.
         tolerances: Largest re-integration errors allowed [rad or m], [rad/s or m/s].
         solves: Solves on the mesh of the base.
@@ -90,6 +91,7 @@ class Tradeoff:
     condition: str
     points: tuple[FrontPoint, ...]
     base_weight: float
+    optimum: Mapping[str, float]
     recorded: tuple[float, float] | None
     tolerances: tuple[float, float]
     solves: int

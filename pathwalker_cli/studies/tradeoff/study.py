@@ -203,6 +203,7 @@ def _result(
         condition=config.condition,
         points=points,
         base_weight=config.cost.walking_speed_weight,
+        optimum=measures(near.optimum),
         recorded=None
         if recorded is None
         else (recorded.walking_speed.min, recorded.walking_speed.max),

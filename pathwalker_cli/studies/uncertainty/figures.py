@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any, Final
 
 import matplotlib as mpl
@@ -19,20 +21,21 @@ from pathwalker_cli.output.figures.style import (
     LINE_COLOUR,
     MARKER,
     NEUTRAL,
-    PAGE,
-    SMALL,
     STYLE,
     dress,
     legend,
     new_figure,
 )
-from pathwalker_cli.studies.measures import Measure
+from pathwalker_cli.studies.springs import Ranges
 from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
 
 __all__ = ["correlation_figure", "save_uncertainty_figures", "spread_figure"]
 
 _STRIP: Final = 0.22
 """Half the height over which points of a row are scattered, so that equal ones can be told."""
+
+_LABEL: Final = 20
+"""Characters of the longest line of the name of a row."""
 
 _SEED: Final = 0
 
@@ -45,34 +48,44 @@ def save_uncertainty_figures(result: Uncertainty, folder: Path) -> None:
     if not result.converged:
         return
     found = spreads(result)
-    save_formats(spread_figure(result, found), folder, "uncertainty")
+    values = {measure.key: result.values(measure.key) for measure in result.measures}
+    save_formats(spread_figure(values, result.ranges, found), folder, "uncertainty")
     save_formats(correlation_figure(result, found), folder, "correlations")
 
 
-def spread_figure(result: Uncertainty, found: list[Spread]) -> Figure:
-    """Return the springs of all draws in their ranges, and cost and gait around the base."""
-    springs = [spread for spread in found if spread.measure.key in result.ranges]
-    others = [spread for spread in found if spread.measure.key not in result.ranges]
+def spread_figure(
+    values: Mapping[str, np.ndarray], ranges: Ranges, found: Sequence[Spread]
+) -> Figure:
+    """Return the springs of all draws in their ranges, and cost and gait around the base.
+
+    Args:
+        values: Every measure of all converged draws, SI units, each of shape (n,).
+        ranges: Allowed range by spring [N m/rad].
+        found: How the measures spread.
+    """
+    springs = [spread for spread in found if spread.measure.key in ranges]
+    others = [spread for spread in found if spread.measure.key not in ranges]
     with mpl.rc_context(STYLE):
-        fig = new_figure(PAGE, 0.9 + 0.34 * max(len(springs) + 1, len(others)))
-        left, right = fig.subplots(1, 2)
+        rows = (len(springs) + 1, len(others))
+        fig = new_figure(1.6 + 0.27 * sum(rows))
+        left, right = fig.subplots(2, 1, height_ratios=rows)
         for y, spread in enumerate(springs):
-            low, high = result.ranges[spread.measure.key]
+            low, high = ranges[spread.measure.key]
             left.plot([low, high], [y, y], color="#cccccc", linewidth=7.0, solid_capstyle="butt")
-            _draw(left, y, result.values(spread.measure.key), spread, 1.0)
-            left.text(high, y - 0.3, _limits(spread), ha="right", va="bottom", fontsize=SMALL)
-        _rows(left, [_spring(spread.measure) for spread in springs], -0.95)
+            _draw(left, y, values[spread.measure.key], spread, 1.0)
+            left.text(high, y - 0.3, _limits(spread), ha="right", va="bottom")
+        _rows(left, [spread.measure.label for spread in springs], -0.95)
         dress(left, "Identified springs", "stiffness [N m/rad], logarithmic")
         _stiffness_axis(left)
         for y, spread in enumerate(others):
-            values = 100.0 * (result.values(spread.measure.key) / spread.base - 1.0)
-            _draw(right, y, values, spread, 100.0)
-        _rows(right, [spread.measure.label for spread in others], -0.6)
+            shares = 100.0 * (values[spread.measure.key] / spread.base - 1.0)
+            _draw(right, y, shares, spread, 100.0)
+        _rows(right, [fill(spread.measure.label, _LABEL) for spread in others], -0.6)
         right.axvline(0.0, color=NEUTRAL, linewidth=0.6)
         dress(right, "Cost and gait", "deviation from the base [%]")
         for ax in (left, right):
             ax.grid(visible=False, axis="y")
-        legend(fig, _handles(len(result.converged)))
+        legend(fig, _handles(len(values[found[0].measure.key])))
         return fig
 
 
@@ -106,16 +119,11 @@ def _stiffness_axis(ax: Axes) -> None:
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
 
 
-def _spring(measure: Measure) -> str:
-    symbol, side = measure.label.split()
-    return f"${symbol[0]}_{symbol[-1]}$ {side}"
-
-
 def _limits(spread: Spread) -> str:
     """Return how often a spring sits at a limit."""
     if spread.lower is None or spread.upper is None:
         return "prescribed"
-    return f"at lower limit {100.0 * spread.lower:.0f} %, at upper {100.0 * spread.upper:.0f} %"
+    return f"softest {100.0 * spread.lower:.0f} %, stiffest {100.0 * spread.upper:.0f} %"
 
 
 def _rows(ax: Axes, labels: list[str], top: float) -> None:
@@ -145,20 +153,38 @@ def correlation_figure(result: Uncertainty, found: list[Spread]) -> Figure:
     table = np.array([spread.correlations for spread in found]).T
     level = chance_level(len(result.converged), len(inputs))
     with mpl.rc_context(STYLE):
-        fig = new_figure(PAGE, 1.6 + 0.16 * len(inputs))
+        fig = new_figure(1.5 + 0.13 * len(inputs))
         ax = fig.subplots()
         # blue and orange with white between: signs differ for any colour vision
         image = ax.imshow(table, cmap="PuOr_r", vmin=-1.0, vmax=1.0, aspect="auto")
         for (y, x), value in np.ndenumerate(table):
             if np.isfinite(value) and abs(value) > level:
                 colour = "white" if abs(value) > 0.6 else "black"
-                ax.text(x, y, f"{value:+.2f}", ha="center", va="center", color=colour, fontsize=6.5)
+                ax.text(x, y, _digit(value), color=colour, **_CELL)
             elif not np.isfinite(value):
-                ax.text(x, y, "-", ha="center", va="center", color=NEUTRAL, fontsize=6.5)
-        ax.set_yticks(range(len(inputs)), inputs)
-        ax.set_xticks(range(len(found)), [s.measure.short for s in found], rotation=45, ha="right")
-        ax.tick_params(labelsize=SMALL, length=0.0)
-        ax.set_title(f"Rank correlation; numbers where chance ({level:.2f}) does not explain it")
-        bar = fig.colorbar(image, ax=ax, pad=0.01, label="rank correlation [1]")
-        bar.ax.tick_params(labelsize=SMALL)
+                ax.text(x, y, "-", color=NEUTRAL, **_CELL)
+        ax.set_yticks(range(len(inputs)), [_input(place) for place in inputs])
+        ax.set_xticks(range(len(found)), [s.measure.short for s in found], rotation=90)
+        ax.tick_params(length=0.0)
+        words = (
+            f"rank correlation [1]; numbers where chance\n(up to {level:.2f}) does not explain it"
+        )
+        fig.colorbar(image, ax=ax, location="bottom", aspect=40, pad=0.01, label=words)
         return fig
+
+
+_CELL: Final[dict[str, Any]] = {"ha": "center", "va": "center", "fontsize": 6.5}
+
+
+def _digit(value: float) -> str:
+    """Return a correlation as a narrow cell holds it: "+.7", "-1"."""
+    return f"{value:+.1f}".replace("0.", ".").replace("1.0", "1")
+
+
+def _input(place: str) -> str:
+    """Return the name of an input beside a table: what its group is called is left out."""
+    group, _, name = place.partition(".")
+    if group == "recorded":
+        name = name.partition(".")[2].replace("joint_ranges.", "range of ")
+    words = {"segment_lengths": f"length of {name}"}.get(group, name or group)
+    return words.replace("_", " ").replace(".", ", ")

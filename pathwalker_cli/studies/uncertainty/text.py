@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.studies.measures import Measure, write_table
 from pathwalker_cli.studies.pool import Solved
 from pathwalker_cli.studies.springs import free_springs
@@ -17,12 +18,13 @@ from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chanc
 __all__ = [
     "FILES",
     "failure_lines",
+    "shown_text",
     "uncertainty_content",
     "uncertainty_lines",
     "write_uncertainty",
 ]
 
-FILES: Final = ("draws.csv", "uncertainty.csv", "correlations.csv")
+FILES: Final = ("draws.csv", "uncertainty.csv", "correlations.csv", "uncertainty.json")
 
 _DIGITS: Final = {"N m/rad": 1, "deg": 1, "m": 3, "m/s": 3, "s": 3, "s/m": 3, "1": 4}
 """Digits after the point by unit shown."""
@@ -32,7 +34,7 @@ _TOLD: Final = 5
 
 
 def write_uncertainty(result: Uncertainty, folder: Path) -> None:
-    """Write `draws.csv`, `uncertainty.csv` and `correlations.csv`."""
+    """Write `draws.csv`, `uncertainty.csv`, `correlations.csv` and `uncertainty.json`."""
     _write_draws(result, folder / FILES[0])
     found = spreads(result)
     names = [entry.place for entry in result.draws.inputs]
@@ -52,6 +54,7 @@ def write_uncertainty(result: Uncertainty, folder: Path) -> None:
         ["input", *keys],
         ([name, *map(_number, row)] for name, row in zip(names, table.tolist(), strict=True)),
     )
+    write_json(folder / FILES[3], uncertainty_content(result))
 
 
 def uncertainty_content(result: Uncertainty) -> dict[str, Any]:
@@ -138,14 +141,15 @@ def uncertainty_lines(result: Uncertainty) -> Iterator[str]:
 def _row(spread: Spread) -> str:
     measure = spread.measure
     unit = "" if measure.unit == "1" else f" [{measure.shown_unit}]"
-    low, middle, high = (_shown(measure, value) for value in spread.quantiles)
+    low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
     place, strength = _strongest(spread)
     told = "" if strength is None else f"{strength:+.2f}"
-    base = _shown(measure, spread.base)
+    base = shown_text(measure, spread.base)
     return _line(f"{measure.label}{unit}", base, middle, f"{low} to {high}", place or "-", told)
 
 
-def _shown(measure: Measure, value: float) -> str:
+def shown_text(measure: Measure, value: float) -> str:
+    """Return a value of a measure in the unit for people."""
     return f"{measure.shown(value):.{_DIGITS[measure.shown_unit]}f}"
 
 
