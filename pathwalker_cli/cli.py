@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from importlib import import_module
 from typing import Any, Final, NoReturn
 
@@ -152,6 +153,13 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 """Commands by what they are for, in the order of the help."""
 
 
+_MENDS: Final = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "; make room, then call again"),
+    **dict.fromkeys((errno.EROFS, errno.EACCES, errno.EPERM), "; choose another place"),
+}
+"""What to do about errors of the disk that nobody foresaw where they arose."""
+
+
 class _LazyGroup(click.Group):
     """Imports a command when it is called, and is the one place where errors become exit codes."""
 
@@ -195,7 +203,8 @@ class _LazyGroup(click.Group):
             raise  # who reads the output went away: click ends quietly
         except OSError as problem:
             place = f"{problem.filename}: " if problem.filename else ""
-            _fail(ctx, f"{place}{problem.strerror or problem}", REFUSED)
+            mend = _MENDS.get(problem.errno or 0, "")
+            _fail(ctx, f"{place}{problem.strerror or problem}{mend}", REFUSED)
         except KeyboardInterrupt:
             _fail(ctx, "stopped by the user before there was anything to keep", STOPPED)
 

@@ -26,6 +26,7 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.commands.batch_progress import BatchProgress
 from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
+from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.output import run_folder
 from pathwalker_cli.output.run_folder import config_text, write_run
@@ -34,7 +35,6 @@ from pathwalker_cli.patient import load_patient
 from pathwalker_cli.studies.batch import ledger, local
 from pathwalker_cli.studies.batch.cases import Case, load_cases
 from pathwalker_cli.studies.batch.local import LocalPool
-from pathwalker_cli.studies.batch.lock import locked
 from pathwalker_cli.studies.batch.names import case_name, short_keys, slug
 from pathwalker_cli.studies.batch.study import Watch, run_batch
 from pathwalker_cli.studies.batch.table import CaseTable
@@ -621,17 +621,18 @@ def test_a_run_that_cannot_be_seen_is_a_failed_case(
 def test_two_processes_in_one_folder_are_refused(tmp_path: Path) -> None:
     script = (
         "import sys, time\nfrom pathlib import Path\n"
-        "from pathwalker_cli.studies.batch.lock import locked\n"
-        "with locked(Path(sys.argv[1])):\n    print('held', flush=True)\n    time.sleep(60)\n"
+        "from pathwalker_cli.io.lock import locked\n"
+        "with locked(Path(sys.argv[1]) / '.lock', Path()):\n"
+        "    print('held', flush=True)\n    time.sleep(60)\n"
     )
     command = [sys.executable, "-c", script, str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "held\n"
-        with pytest.raises(DataError, match="another `pathwalker batch` is at work there"):
+        with pytest.raises(DataError, match="another `pathwalker` is at work there"):
             run_batch(kinds(tmp_path, "a"), tmp_path / "out", Serial(fake_work), Watch())
         other.kill()
-    with locked(tmp_path / "out"):
+    with locked(tmp_path / "out" / ".lock", tmp_path):
         pass
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +17,9 @@ import numpy as np
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.io.atomic import check_room, swapped, sweep
 from pathwalker_cli.io.json_file import read_json, write_json
+from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.recordings import write_recording
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.ocp.ipopt import Multipliers
@@ -43,9 +46,11 @@ __all__ = [
     "PATIENT",
     "Run",
     "check_target",
+    "claimed_run",
     "config_text",
     "default_folder",
     "load_run",
+    "release_runs",
     "repeatable_config",
     "warm_start_run",
     "write_run",
@@ -188,6 +193,7 @@ def check_target(folder: str | Path) -> Path:
     for place in {above, target.parent} if target.exists() else {above}:
         if not os.access(place, os.W_OK | os.X_OK):
             raise DataError("cannot be written", where=str(place), mend=mend)
+    check_room(target)
     names = {path.name for path in target.iterdir()} if target.exists() else set()
     foreign = sorted(names - ENTRIES) if _METRICS in names else sorted(names)
     if foreign:
@@ -196,6 +202,39 @@ def check_target(folder: str | Path) -> Path:
             what, where=str(folder), allowed="a new folder or an earlier run", mend=mend
         )
     return target
+
+
+@contextmanager
+def claimed_run(folder: str | Path, wait: bool = False) -> Iterator[None]:
+    """Keep other processes from writing a run folder meanwhile, and tidy up after killed ones.
+
+    Args:
+        folder: The run folder.
+        wait: Whether to wait for another process that is at work there.
+
+    Raises:
+        DataError: If another process is at work there, or no run can be written there.
+    """
+    target = check_target(folder)
+    with locked(target.with_name(f".{target.name}.lock"), Path(folder), wait):
+        _recover(target)
+        sweep(target.parent, target.name)
+        yield
+
+
+def release_runs(folder: Path) -> None:
+    """Tidy up after killed processes that wrote run folders in a folder."""
+    for lock in folder.glob(".*.lock"):
+        run = folder / lock.name.removeprefix(".").removesuffix(".lock")
+        with suppress(DataError), claimed_run(run):  # who is at work there still, goes on
+            pass
+
+
+def _recover(target: Path) -> None:
+    """Put a run back whose process was killed while it moved another one into its place."""
+    for old in target.parent.glob(f".{glob.escape(target.name)}.????????.tmp/old"):
+        if not target.exists():
+            old.rename(target)
 
 
 @contextmanager
@@ -213,7 +252,9 @@ def _staged(folder: Path) -> Iterator[Path]:
         _exchange(fresh, check_target(folder), staging / "old")
     except OSError as problem:
         reason = problem.strerror or str(problem)
-        raise DataError(f"cannot be written: {reason}", where=str(folder)) from None
+        raise DataError(
+            f"cannot be written: {reason}", where=str(folder), mend="choose another --out"
+        ) from None
     finally:
         if staging is not None:
             shutil.rmtree(staging, ignore_errors=True)
@@ -222,6 +263,8 @@ def _staged(folder: Path) -> Iterator[Path]:
 def _exchange(fresh: Path, target: Path, old: Path) -> None:
     """Move a folder to its place; an older one comes back if that fails."""
     if target.exists():
+        if swapped(fresh, target):
+            return
         target.rename(old)
     try:
         fresh.rename(target)
