@@ -77,6 +77,8 @@ _BATCH: Final = Command(("batch", "study.yaml"), ("cases.csv", "cases/*/states.c
 
 COMMANDS: Final[dict[str, Command]] = {
     "solve": Command(("solve", "mapd-healthy", "mapd-healthy", *settings(COARSE)), ("*.csv",)),
+    "solve, starts": Command(("solve", "mapd-healthy", "mapd-healthy", *settings(COARSE), "--set",
+                              "starts=2"), ("*.csv",)),
     "perturb": Command(study("perturb", springs=_SPRINGS), ("perturbation.csv",), "points/*.npz"),
     "landscape": Command(study("landscape", **_GRID), ("landscape.csv",), "points/*.npz"),
     "tradeoff": Command(
@@ -149,7 +151,7 @@ class Campaign:
         command, tally = COMMANDS[name], Tally()
         with self._cluster(name) as address:
             words = [*command.words, *address]
-            whole = self.folder / f"{name.split(',')[0]}-whole{len(address)}"
+            whole = self.folder / f"whole-{list(COMMANDS).index(name)}"
             began = time.monotonic()
             code, output = self.ended([*words, "--out", whole.name])
             tally.seconds = time.monotonic() - began

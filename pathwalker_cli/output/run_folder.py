@@ -21,13 +21,14 @@ from pathwalker_cli.io.atomic import check_room, swapped, sweep
 from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.recordings import write_recording
-from pathwalker_cli.io.yaml_file import yaml_text
+from pathwalker_cli.io.yaml_file import validate, yaml_text
 from pathwalker_cli.ocp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.ocp.start import start_recording
 from pathwalker_cli.output.figures import save_figures
+from pathwalker_cli.output.metrics_model import RunMetrics
 from pathwalker_cli.output.motion_file import read_motion, write_motion
 from pathwalker_cli.output.multipliers_file import read_multipliers, write_multipliers
 from pathwalker_cli.output.recorded_reference import recorded_reference
@@ -62,8 +63,6 @@ PATIENT: Final = "patient.yaml"
 """The patient of a run, so that the folder is enough to verify and to repeat it."""
 _METRICS, _MOTION, _RECORDINGS = "metrics.json", "motion.npz", "recordings"
 _MULTIPLIERS: Final = "multipliers.npz"
-_TEXTS: Final = ("input_hashes", "versions", "bound_sources")
-"""Metrics that are texts by key."""
 _SEAL: Final = "NOT_CONVERGED.txt"
 
 ENTRIES: Final = frozenset(
@@ -335,26 +334,14 @@ def _read_metrics(folder: Path) -> dict[str, Any]:
     """Return the metrics of a run."""
     path = _file(folder, _METRICS)
     metrics = read_json(path, mend="solve again")
-    keys = ("run_format", "problem", "status", "condition", "motion_hash")
-    missing = [key for key in keys if key not in metrics]
-    if missing:
-        raise DataError(f"lacks the key {missing[0]}", where=str(path),
+    if "run_format" not in metrics:
+        raise DataError("lacks the key run_format", where=str(path),
                         allowed="metrics that `pathwalker solve` wrote")  # fmt: skip
-    other = [key for key in keys[1:] if not isinstance(metrics[key], str)]
-    if other:
-        raise DataError(f"{other[0]} is no text", where=str(path), mend="solve again")
-    other = [key for key in _TEXTS if not _holds_texts(metrics.get(key, {}))]
-    if other:
-        raise DataError(f"{other[0]} holds no texts by key", where=str(path), mend="solve again")
     if metrics["run_format"] != RUN_FORMAT:
         raise DataError(f"has run_format {metrics['run_format']}", where=str(path),
                         allowed=str(RUN_FORMAT), mend="solve again")  # fmt: skip
+    validate(metrics, RunMetrics, where=str(path), error=DataError)
     return metrics
-
-
-def _holds_texts(value: Any) -> bool:
-    """Return whether a value maps keys to texts, or to nothing where something is not known."""
-    return isinstance(value, dict) and all(v is None or isinstance(v, str) for v in value.values())
 
 
 def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
