@@ -486,7 +486,7 @@ def test_a_worker_that_dies_loses_only_its_own_case(tmp_path: Path) -> None:
 def test_workers_that_cannot_begin_fail_every_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(local, "_prepare", die)
+    monkeypatch.setattr(local, "prepare_worker", die)
     tasks = [Task(str(i), "x" * 20000, str(tmp_path)) for i in range(9)]
     results = dict(LocalPool(4).run(tasks, fake_work))
     assert {result["reason"] for result in results.values()} == {LOST}

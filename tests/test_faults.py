@@ -442,3 +442,55 @@ def test_nothing_reads_the_clock_of_the_wall_but_for_dates() -> None:
         if any(word in path.read_text(encoding="utf-8") for word in ("time.time(", "datetime."))
     }
     assert found <= told, "durations are differences of time.perf_counter or time.monotonic"
+
+
+# Workers and Ctrl-C
+
+POOL = """
+import os, signal, sys, time
+from pathlib import Path
+from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.ocp.processes import called_elsewhere
+
+def work(seconds):
+    if seconds < 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    time.sleep(seconds)
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start jobs deaf
+    print("begun", flush=True)
+    try:
+        list(called_elsewhere(work, [(float(word),) for word in sys.argv[1:]], 2))
+    except KeyboardInterrupt:
+        print("stopped", flush=True)
+    except NotConvergedError as error:
+        print(error, flush=True)
+"""
+
+
+def pool(folder: Path, *seconds: float) -> subprocess.Popen[str]:
+    """Return a process whose two workers sleep, or die where the seconds are negative."""
+    (folder / "pool.py").write_text(POOL, encoding="utf-8")
+    words = [sys.executable, folder / "pool.py", *map(str, seconds)]
+    return subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    )
+
+
+@pytest.mark.parametrize("delay", [0.1, 0.5, 2.0])
+def test_ctrl_c_at_any_time_ends_all_workers_in_one_line(tmp_path: Path, delay: float) -> None:
+    with pool(tmp_path, 60, 60, 60) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begun\n"
+        time.sleep(delay)
+        os.killpg(process.pid, signal.SIGINT)
+        output, _ = process.communicate(timeout=20)
+    assert output == "stopped\n"
+
+
+def test_a_worker_that_is_lost_is_told(tmp_path: Path) -> None:
+    with pool(tmp_path, 0, -1, 60) as process:
+        output, _ = process.communicate(timeout=30)
+    assert output.startswith("begun\na process was ended from outside (out of memory?)")
+    assert output.count("\n") == 2
