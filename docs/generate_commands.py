@@ -37,7 +37,7 @@ writes a JSON file has the content of this file.
 | 0 | done; of `solve`, `reproduce` and all studies: converged; of `doctor`: ready |
 | {not_converged} | `solve`, `reproduce`, studies: not converged; `doctor`: something is missing |
 | {refused} | bad input: one sentence on stderr says what, where and how to mend it |
-| {stopped} | Ctrl-C before there was anything to keep |
+| {stopped} | Ctrl-C outside of a solve: what was finished before is kept |
 
 | command | purpose |
 | --- | --- |

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
+
+from pathwalker_cli.paths import source_stamps
 
 if TYPE_CHECKING:
     from pathwalker_cli.model.walker import build_walker
@@ -13,8 +14,8 @@ if TYPE_CHECKING:
 
 __all__ = ["__version__", "build_walker", "load_patient"]
 
-IMPORTED_AT = time.time()
-"""When this process began to read the sources of the package [s since 1970]."""
+SOURCES = source_stamps()
+"""What the sources were when this process began to read them."""
 
 _HOMES = {
     "build_walker": "pathwalker_cli.model.walker",

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, Final, NoReturn
 
@@ -18,6 +23,7 @@ NOT_CONVERGED: Final = 1
 """Exit code of a solve that did not converge."""
 REFUSED: Final = 2
 """Exit code of input that cannot be used, as of wrong usage."""
+STOPPED_TEXT: Final = "stopped by the user; what was finished before is kept"
 STOPPED: Final = 130
 """Exit code after Ctrl-C, by custom 128 + SIGINT."""
 
@@ -152,6 +158,13 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
 """Commands by what they are for, in the order of the help."""
 
 
+_MENDS: Final = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "; make room, then call again"),
+    **dict.fromkeys((errno.EROFS, errno.EACCES, errno.EPERM), "; choose another place"),
+}
+"""What to do about errors of the disk that nobody foresaw where they arose."""
+
+
 class _LazyGroup(click.Group):
     """Imports a command when it is called, and is the one place where errors become exit codes."""
 
@@ -185,7 +198,8 @@ class _LazyGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with _stoppable() as stopped:
+                return super().invoke(ctx)
         except PathwalkerError as error:
             code = NOT_CONVERGED if isinstance(error, NotConvergedError) else REFUSED
             if code == NOT_CONVERGED:
@@ -195,9 +209,41 @@ class _LazyGroup(click.Group):
             raise  # who reads the output went away: click ends quietly
         except OSError as problem:
             place = f"{problem.filename}: " if problem.filename else ""
-            _fail(ctx, f"{place}{problem.strerror or problem}", REFUSED)
+            mend = _MENDS.get(problem.errno or 0, "")
+            _fail(ctx, f"{place}{problem.strerror or problem}{mend}", REFUSED)
         except KeyboardInterrupt:
-            _fail(ctx, "stopped by the user before there was anything to keep", STOPPED)
+            _fail(ctx, STOPPED_TEXT, STOPPED)
+        except Exception:
+            if not stopped:
+                raise
+            _fail(ctx, STOPPED_TEXT, STOPPED)  # libraries make errors of their own out of Ctrl-C
+
+
+@contextmanager
+def _stoppable() -> Iterator[list[int]]:
+    """Let Ctrl-C end a command in order, and a second one end the process at once.
+
+    Yields:
+        What is empty until then.
+    """
+    stopped: list[int] = []
+
+    def stop(number: int, _: object) -> None:
+        stopped.append(number)
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        raise KeyboardInterrupt
+
+    # a command that runs in the background stays deaf, and only the main thread may ask
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield stopped
+        return
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield stopped
+    finally:
+        if not stopped:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _fail(ctx: click.Context, sentence: str, code: int) -> NoReturn:

@@ -139,12 +139,14 @@ def test_junk_for_any_value_is_accepted_or_refused_in_a_sentence(kind: str, tmp_
     assert refused
 
 
-@pytest.mark.parametrize("fault", ["folder", "link to itself", "broken link", "missing"])
+@pytest.mark.parametrize("fault", ["folder", "pipe", "link to itself", "broken link", "missing"])
 @pytest.mark.parametrize("kind", LOADERS)
 def test_what_is_no_file_is_refused(kind: str, fault: str, tmp_path: Path) -> None:
     path = tmp_path / "made.yaml"
     if fault == "folder":
         path.mkdir()
+    elif fault == "pipe":
+        os.mkfifo(path)
     elif fault != "missing":
         path.symlink_to(path if fault == "link to itself" else tmp_path / "nowhere")
     sentence(lambda: LOADERS[kind](path))
@@ -211,11 +213,13 @@ def test_broken_metrics_are_refused(fault: str, run: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["metrics.json", "motion.npz", "config.resolved.yaml"])
-@pytest.mark.parametrize("fault", ["missing", "folder", "link to itself"])
+@pytest.mark.parametrize("fault", ["missing", "folder", "pipe", "link to itself"])
 def test_runs_that_lack_a_file_are_refused(name: str, fault: str, run: Path) -> None:
     (run / name).unlink()
     if fault == "folder":
         (run / name).mkdir()
+    elif fault == "pipe":
+        os.mkfifo(run / name)
     elif fault == "link to itself":
         (run / name).symlink_to(run / name)
     assert str(run) in sentence(lambda: load_run(run))

@@ -26,6 +26,7 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.commands.batch_progress import BatchProgress
 from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
+from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.output import run_folder
 from pathwalker_cli.output.run_folder import config_text, write_run
@@ -34,7 +35,6 @@ from pathwalker_cli.patient import load_patient
 from pathwalker_cli.studies.batch import ledger, local
 from pathwalker_cli.studies.batch.cases import Case, load_cases
 from pathwalker_cli.studies.batch.local import LocalPool
-from pathwalker_cli.studies.batch.lock import locked
 from pathwalker_cli.studies.batch.names import case_name, short_keys, slug
 from pathwalker_cli.studies.batch.study import Watch, run_batch
 from pathwalker_cli.studies.batch.table import CaseTable
@@ -486,7 +486,7 @@ def test_a_worker_that_dies_loses_only_its_own_case(tmp_path: Path) -> None:
 def test_workers_that_cannot_begin_fail_every_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(local, "_prepare", die)
+    monkeypatch.setattr(local, "prepare_worker", die)
     tasks = [Task(str(i), "x" * 20000, str(tmp_path)) for i in range(9)]
     results = dict(LocalPool(4).run(tasks, fake_work))
     assert {result["reason"] for result in results.values()} == {LOST}
@@ -523,8 +523,10 @@ def test_a_restart_does_only_what_is_not_done(tmp_path: Path, made_solution: Mad
     assert status == {
         "first": "converged", "fails": "the iterates diverged", "last": "not yet run",
     }  # fmt: skip
-    left = folder / "cases" / ".last.abc.tmp"
+    last = cases[-1].name
+    left = folder / "cases" / f".{last}.0123abcd.tmp"
     left.mkdir()
+    left.with_name(f".{last}.lock").touch()  # of a worker that was killed
     first = folder / "cases" / cases[0].name / "metrics.json"
     before = first.stat()
     pool = Serial(made(made_solution))
@@ -532,7 +534,7 @@ def test_a_restart_does_only_what_is_not_done(tmp_path: Path, made_solution: Mad
     assert pool.given == [cases[1].name, cases[2].name]
     assert not report.failed
     assert (first.stat().st_mtime_ns, first.stat().st_ino) == (before.st_mtime_ns, before.st_ino)
-    assert not left.exists()
+    assert not list(folder.rglob(".*"))
     with (folder / "times.csv").open(encoding="utf-8", newline="") as file:
         times = {row["case"]: row for row in csv.DictReader(file)}
     assert list(times) == [case.name for case in cases]
@@ -621,17 +623,18 @@ def test_a_run_that_cannot_be_seen_is_a_failed_case(
 def test_two_processes_in_one_folder_are_refused(tmp_path: Path) -> None:
     script = (
         "import sys, time\nfrom pathlib import Path\n"
-        "from pathwalker_cli.studies.batch.lock import locked\n"
-        "with locked(Path(sys.argv[1])):\n    print('held', flush=True)\n    time.sleep(60)\n"
+        "from pathwalker_cli.io.lock import locked\n"
+        "with locked(Path(sys.argv[1]) / '.lock', Path()):\n"
+        "    print('held', flush=True)\n    time.sleep(60)\n"
     )
     command = [sys.executable, "-c", script, str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "held\n"
-        with pytest.raises(DataError, match="another `pathwalker batch` is at work there"):
+        with pytest.raises(DataError, match="another `pathwalker` is at work there"):
             run_batch(kinds(tmp_path, "a"), tmp_path / "out", Serial(fake_work), Watch())
         other.kill()
-    with locked(tmp_path / "out"):
+    with locked(tmp_path / "out" / ".lock", tmp_path):
         pass
 
 

@@ -631,7 +631,7 @@ def test_studies_that_do_not_fit_are_refused_when_named(runs: Path, tmp_path: Pa
     content = json.loads(path.read_text())
     path.write_text(json.dumps(content | {"elasticities": {"a": {"cost": "b"}}}))
     sentence = refusal(runs / "mapd-orthosis", studies / "sensitivity", "-o", out)
-    assert "does not hold what `pathwalker sensitivity` writes" in sentence
+    assert "sensitivity.json: elasticities.a.cost: is 'b'; allowed: a number" in sentence
     broken = Path(shutil.copytree(studies / "sensitivity", runs / "broken"))
     (broken / "sensitivity.json").write_text("{")
     assert page_of([runs / "mapd-orthosis"]).sections, "a study that nobody named does not matter"

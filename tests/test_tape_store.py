@@ -111,7 +111,9 @@ def test_sources_that_changed_under_a_process_are_not_trusted(
     monkeypatch.setattr(tape_store, "_makers", tape_store._makers.__wrapped__)
     keep_tapes("a", BLOCKS)
     assert kept_tapes("a") is not None
-    monkeypatch.setattr(pathwalker_cli, "IMPORTED_AT", Path(__file__).stat().st_ctime - 1e9)
+    now = pathwalker_cli.SOURCES
+    changed = {path: (ino, size, time - 1) for path, (ino, size, time) in now.items()}
+    monkeypatch.setattr(pathwalker_cli, "SOURCES", changed)
     assert kept_tapes("a") is None
     keep_tapes("b", BLOCKS)
     assert len(list(folder.iterdir())) == 1

@@ -30,7 +30,7 @@ def landscape_command(
     DIR/landscape.csv, DIR/landscape.json and DIR/figures hold the result. Exit codes: 0 done, 1 the
     base did not converge or Ctrl-C, 2 bad input.
     """
-    from pathwalker_cli.studies.base import check_folder, load_study
+    from pathwalker_cli.studies.base import claimed_folder, load_study
     from pathwalker_cli.studies.landscape.files import ENTRIES, landscape_content, write_landscape
     from pathwalker_cli.studies.landscape.solve import landscape_of
     from pathwalker_cli.studies.landscape.study import LandscapeStudy
@@ -38,9 +38,10 @@ def landscape_command(
 
     with meant_as("landscape", config):
         study = load_study(config, LandscapeStudy, changes)
-    check_folder(out, ENTRIES, "landscape")
-    landscape = landscape_of(study, base_of(study, run, out, quiet), out / "points", teller(quiet))
-    write_landscape(out, landscape)
+    with claimed_folder(out, ENTRIES, "landscape"):
+        base = base_of(study, run, out, quiet)
+        landscape = landscape_of(study, base, out / "points", teller(quiet))
+        write_landscape(out, landscape)
     if as_json:
         print_json({"folder": str(out), **landscape_content(landscape)})
     elif not quiet:

@@ -39,7 +39,7 @@ def perturb_command(
     2 bad input.
     """
     from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.studies.base import check_folder, load_study
+    from pathwalker_cli.studies.base import claimed_folder, load_study
     from pathwalker_cli.studies.perturbation.figures import save_perturbation_figure
     from pathwalker_cli.studies.perturbation.study import PerturbationStudy, perturb
     from pathwalker_cli.studies.perturbation.text import (
@@ -50,19 +50,18 @@ def perturb_command(
 
     with meant_as("perturbation", config):
         study = load_study(config, PerturbationStudy, changes)
-    check_folder(out, ENTRIES, "perturb")
-    base = base_with_springs(study, run, out, quiet)
     tell = teller(quiet)
-    result = perturb(
-        study,
-        base,
-        out,
-        lambda row: tell(
-            f"{row.label}: {row.status}, {row.iterations} iterations, {row.seconds:.1f} s"
-        ),
-    )
-    write_perturbation(result, out)
-    save_perturbation_figure(result, out / "figures")
+    with claimed_folder(out, ENTRIES, "perturb"):
+        result = perturb(
+            study,
+            base_with_springs(study, run, out, quiet),
+            out,
+            lambda row: tell(
+                f"{row.label}: {row.status}, {row.iterations} iterations, {row.seconds:.1f} s"
+            ),
+        )
+        write_perturbation(result, out)
+        save_perturbation_figure(result, out / "figures")
     if as_json:
         print_json({"folder": str(out), **perturbation_content(result)})
     elif not quiet:

@@ -48,6 +48,8 @@ def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, qui
     """
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.reproduce.pipeline import PAGE, reproduce
+    from pathwalker_cli.reproduce.plan import ENTRIES
+    from pathwalker_cli.studies.base import claimed_folder
 
     def say(line: str) -> None:
         if not quiet:
@@ -56,7 +58,8 @@ def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, qui
     def solve(study: StudyConfig, folder: Path) -> None:
         _solve(study, folder, quiet)
 
-    results = reproduce(out, solve, say, starts, quick, c3d)
+    with claimed_folder(out, ENTRIES, "reproduce"):
+        results = reproduce(out, solve, say, starts, quick, c3d)
     say(f"\nWritten to {out / PAGE}")
     if results.failed:
         raise NotConvergedError(

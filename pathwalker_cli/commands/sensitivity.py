@@ -30,7 +30,7 @@ def sensitivity_command(
     come from the optimality conditions. Exit codes: 0 done, 1 the base did not converge, 2 bad
     input.
     """
-    from pathwalker_cli.studies.base import check_folder, load_study
+    from pathwalker_cli.studies.base import claimed_folder, load_study
     from pathwalker_cli.studies.sensitivity.figures import save_sensitivity_figure
     from pathwalker_cli.studies.sensitivity.study import SensitivityStudy, sensitivities
     from pathwalker_cli.studies.sensitivity.text import (
@@ -42,10 +42,10 @@ def sensitivity_command(
 
     with meant_as("sensitivity", config):
         study = load_study(config, SensitivityStudy, changes)
-    check_folder(out, frozenset({"base", "points", "figures", *FILES}), "sensitivity")
-    result = sensitivities(study, base_of(study, run, out, quiet), out)
-    write_sensitivities(result, out)
-    save_sensitivity_figure(result, out / "figures")
+    with claimed_folder(out, frozenset({"base", "points", "figures", *FILES}), "sensitivity"):
+        result = sensitivities(study, base_of(study, run, out, quiet), out)
+        write_sensitivities(result, out)
+        save_sensitivity_figure(result, out / "figures")
     if as_json:
         print_json({"folder": str(out), **sensitivity_content(result)})
     elif not quiet:

@@ -66,13 +66,13 @@ def solve_command(
     """
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.output.run_folder import default_folder
+    from pathwalker_cli.output.run_folder import claimed_run, default_folder
     from pathwalker_cli.output.solve_text import failure_text
     from pathwalker_cli.studies.run import run_study
 
     study, patient = _study(problem, config, changes, smoke)
     folder = out or default_folder(study, patient.id)
-    with Progress(quiet, heading=_worn(study, patient)) as progress:
+    with claimed_run(folder), Progress(quiet, heading=_worn(study, patient)) as progress:
         outcome = run_study(study, folder, warm_start, progress)
     solution = outcome.solution
     if as_json:

@@ -32,17 +32,17 @@ def tradeoff_command(
     input.
     """
     from pathwalker_cli.commands.progress import Progress
-    from pathwalker_cli.studies.base import check_folder, load_study
+    from pathwalker_cli.studies.base import claimed_folder, load_study
     from pathwalker_cli.studies.tradeoff.files import ENTRIES, tradeoff_content, write_tradeoff
     from pathwalker_cli.studies.tradeoff.study import TradeoffStudy, tradeoff_of
     from pathwalker_cli.studies.tradeoff.text import tradeoff_lines
 
     with meant_as("tradeoff", config):
         study = load_study(config, TradeoffStudy, changes)
-    check_folder(out, ENTRIES, "tradeoff")
-    base = base_of(study, run, out, quiet)
-    tradeoff = tradeoff_of(study, base, out, teller(quiet), Progress(quiet=True))
-    write_tradeoff(out, tradeoff)
+    with claimed_folder(out, ENTRIES, "tradeoff"):
+        base = base_of(study, run, out, quiet)
+        tradeoff = tradeoff_of(study, base, out, teller(quiet), Progress(quiet=True))
+        write_tradeoff(out, tradeoff)
     if as_json:
         print_json({"folder": str(out), **tradeoff_content(tradeoff)})
     elif not quiet:

@@ -62,7 +62,7 @@ def uncertainty_command(
 
     from pathwalker_cli.commands.perturb import base_with_springs
     from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.studies.base import check_folder, load_study
+    from pathwalker_cli.studies.base import claimed_folder, load_study
     from pathwalker_cli.studies.uncertainty.figures import save_uncertainty_figures
     from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, uncertainty
     from pathwalker_cli.studies.uncertainty.text import (
@@ -73,12 +73,12 @@ def uncertainty_command(
 
     with meant_as("uncertainty", config):
         study = load_study(config, UncertaintyStudy, changes)
-    check_folder(out, ENTRIES, "uncertainty")
-    base = base_with_springs(study, run, out, quiet)
     count = workers or len(os.sched_getaffinity(0))
-    result = uncertainty(study, base, out, count, _counted(study.draws, teller(quiet)))
-    write_uncertainty(result, out)
-    save_uncertainty_figures(result, out / "figures")
+    with claimed_folder(out, ENTRIES, "uncertainty"):
+        base = base_with_springs(study, run, out, quiet)
+        result = uncertainty(study, base, out, count, _counted(study.draws, teller(quiet)))
+        write_uncertainty(result, out)
+        save_uncertainty_figures(result, out / "figures")
     if as_json:
         print_json({"folder": str(out), **uncertainty_content(result)})
     elif not quiet:

@@ -2,23 +2,41 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import re
+import shutil
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import IO, Any, Final, Literal
 
 from pathwalker_cli.errors import DataError
 
-__all__ = ["atomic_open", "atomic_path", "check_output", "output_path", "write_text"]
+__all__ = [
+    "atomic_open",
+    "atomic_path",
+    "check_output",
+    "check_room",
+    "output_path",
+    "swapped",
+    "sweep",
+    "write_text",
+]
+
+_LEAST_ROOM: Final = 10_000_000
+"""Free bytes of a disk below which nothing long is begun; a run takes some 2 MB."""
+_TEMPORARY: Final = re.compile(r"\..+\.\w{8}\.tmp")
+"""Names of what is being written."""
 
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path that takes the place of `path` when the block ends without an error.
 
-    After an error the temporary file is gone and an older file at `path` is untouched.
+    After an error the temporary file is gone and an older file at `path` is untouched; an error of
+    the disk tells `path`.
 
     Args:
         path: Where the file shall be; its folder must exist.
@@ -28,8 +46,61 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     try:
         yield temporary
         os.replace(temporary, target)
+    except OSError as problem:
+        # a full disk is noticed by a write, which knows no name
+        if problem.errno is not None and problem.filename in (None, str(temporary)):
+            problem.filename, problem.filename2 = str(target), None
+        raise
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_room(folder: Path) -> None:
+    """Refuse a disk that is full, before the work whose results it would take.
+
+    Args:
+        folder: A folder, which need not exist yet.
+
+    Raises:
+        DataError: If there is hardly any room.
+    """
+    above = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    free = shutil.disk_usage(above).free
+    if free < _LEAST_ROOM:
+        raise DataError(
+            f"is on a full disk: {free / 1e6:.1f} MB are free",
+            where=str(folder),
+            allowed=f"{_LEAST_ROOM / 1e6:g} MB or more",
+            mend="make room or choose another --out",
+        )
+
+
+def sweep(folder: Path, name: str = "", deep: bool = False) -> None:
+    """Take away what killed processes had begun to write; nobody may be at work there.
+
+    Args:
+        folder: The folder.
+        name: Name of what was to be written; "" for anything.
+        deep: Whether to look into its folders too.
+    """
+    for left in folder.rglob(".*.tmp") if deep else folder.glob(".*.tmp"):
+        if _TEMPORARY.fullmatch(left.name) and name in ("", left.name[1:-13]):
+            if left.is_dir() and not left.is_symlink():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)
+
+
+def swapped(one: Path, other: Path) -> bool:
+    """Return whether two files or folders took each other's place, in one stroke.
+
+    Where system or disk cannot do that, nothing is done.
+    """
+    exchange = getattr(ctypes.CDLL(None), "renameat2", None)
+    here, both = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
+    return exchange is not None and exchange(
+        here, os.fsencode(one), here, os.fsencode(other), both
+    ) == 0  # fmt: skip
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import Any, Final, NoReturn
 
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open
+from pathwalker_cli.io.special import refuse_special
 
 __all__ = ["json_text", "read_json", "write_json"]
 
@@ -35,6 +36,7 @@ def read_json(path: Path, mend: str = "make it again") -> dict[str, Any]:
     Raises:
         DataError: If it cannot be read or holds something else.
     """
+    refuse_special(path)
     try:
         content = json.loads(
             path.read_text(encoding="utf-8"), parse_int=_whole, parse_constant=_refused

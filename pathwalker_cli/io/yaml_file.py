@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from pathwalker_cli.errors import ConfigError, InputError
 from pathwalker_cli.io.refusals import KeyPath, Lines, dotted, place, sentence
+from pathwalker_cli.io.special import refuse_special
 
 __all__ = ["KeyPath", "Lines", "load_yaml", "read_mapping", "validate", "yaml_text"]
 
@@ -151,6 +152,7 @@ def validate(
 
 def _text(path: Path, error: type[InputError]) -> str:
     """Return the text of a file."""
+    refuse_special(path, error)
     try:
         with path.open("rb") as file:
             content = file.read(_MOST_BYTES + 1)

@@ -204,6 +204,8 @@ def _interruptible(watcher: _Watcher) -> Iterator[None]:
 
     def handler(number: int, frame: FrameType | None) -> None:
         if watcher.stop:
+            if callable(previous):
+                previous(number, frame)
             raise KeyboardInterrupt
         watcher.stop = True
 

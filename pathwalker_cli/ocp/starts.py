@@ -6,10 +6,8 @@ length, speed and stiffness, spread by a Latin hypercube; the first one is the s
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -20,6 +18,7 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.ocp.cost_terms import walked_distance
 from pathwalker_cli.ocp.ipopt import NlpResult
+from pathwalker_cli.ocp.processes import called_elsewhere
 from pathwalker_cli.ocp.shortfall import Shortfall
 from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum, StageRecord
 from pathwalker_cli.ocp.solve import GaitSolver
@@ -99,22 +98,12 @@ def solve_from_starts(config: StudyConfig, finished: Finished | None = None) -> 
 
 
 def _outcomes(studies: list[StudyConfig], finished: Finished | None) -> Iterator[_Outcome]:
-    """Yield the outcomes of all starts as they come; Ctrl-C ends with those that are there."""
+    """Yield the outcomes of all starts as they come."""
     workers = min(len(studies), len(os.sched_getaffinity(0)))
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        futures: list[Future[_Outcome]] = [
-            pool.submit(_solved, number, study) for number, study in enumerate(studies)
-        ]
-        try:
-            for future in as_completed(futures):
-                outcome = future.result()
-                if finished is not None:
-                    finished(outcome.optimum)
-                yield outcome
-        except KeyboardInterrupt:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    for outcome in called_elsewhere(_solved, list(enumerate(studies)), workers):
+        if finished is not None:
+            finished(outcome.optimum)
+        yield outcome
 
 
 def _solved(number: int, study: StudyConfig) -> _Outcome:

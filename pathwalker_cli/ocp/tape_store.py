@@ -27,6 +27,7 @@ import pinocchio as pin
 import pathwalker_cli
 from pathwalker_cli.ocp.kernels import kernels_path
 from pathwalker_cli.ocp.tape import Tape
+from pathwalker_cli.paths import source_stamps
 
 __all__ = ["KeptTapes", "cache_folder", "keep_tapes", "kept_files", "kept_tapes"]
 
@@ -35,8 +36,6 @@ _MOST_FILES: Final = 15
 _SUFFIX: Final = ".tapes"
 _ABANDONED: Final = 3600.0
 """Age at which an unfinished file is sure to belong to no process any more [s]."""
-_CLOCK: Final = 1.0
-"""What the clocks of processor and disk may differ by [s]."""
 _SEAL: Final = hashlib.sha256().digest_size
 
 KeptTapes = Mapping[str, tuple[int, dict[str, Tape]]]
@@ -66,7 +65,7 @@ def kept_files(folder: Path) -> list[Path]:
 def kept_tapes(structure: Hashable) -> dict[str, tuple[int, dict[str, Tape]]] | None:
     """Return the tapes of all blocks of a structure, or None where they are not kept."""
     path = _path(structure)
-    if path is None:
+    if path is None or not path.is_file():  # a pipe would never end
         return None
     try:
         content = path.read_bytes()
@@ -120,18 +119,18 @@ def _path(structure: Hashable) -> Path | None:
 def _makers() -> str | None:
     """Return a hash of the code and the versions that make tapes.
 
-    It is None where files are newer than the import of the package: other code may be running.
+    It is None where files changed since the import of the package: other code may be running.
     """
     versions = (ca.CasadiMeta.version(), ca.CasadiMeta.git_revision(), pin.__version__)
     digest = hashlib.sha256(" ".join((*versions, np.__version__)).encode())
     package, count = Path(pathwalker_cli.__file__).parent, 0
-    for path in _maker_files(package):
-        try:
-            if path.stat().st_ctime > pathwalker_cli.IMPORTED_AT - _CLOCK:
-                return None
-            content = path.read_bytes()
-        except OSError:
+    try:
+        if source_stamps() != pathwalker_cli.SOURCES:
             return None
+        files = [(path, path.read_bytes()) for path in _maker_files(package)]
+    except OSError:
+        return None
+    for path, content in files:
         digest.update(f"{os.path.relpath(path, package)} {len(content)}\n".encode() + content)
         count += 1
     return digest.hexdigest() if count else None

@@ -14,6 +14,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.special import refuse_special
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.ocp.gait import INTEGRALS
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
@@ -84,6 +85,7 @@ def read_arrays(path: Path) -> Mapping[str, np.ndarray]:
     Raises:
         DataError: If the file is missing or damaged.
     """
+    refuse_special(path)
     try:
         with np.load(path, allow_pickle=False) as file:
             if not isinstance(file, np.lib.npyio.NpzFile):

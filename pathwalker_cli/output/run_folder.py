@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import glob
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,15 +17,18 @@ import numpy as np
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.io.atomic import check_room, swapped, sweep
 from pathwalker_cli.io.json_file import read_json, write_json
+from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.recordings import write_recording
-from pathwalker_cli.io.yaml_file import yaml_text
+from pathwalker_cli.io.yaml_file import validate, yaml_text
 from pathwalker_cli.ocp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.series import GaitSeries
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.ocp.start import start_recording
 from pathwalker_cli.output.figures import save_figures
+from pathwalker_cli.output.metrics_model import RunMetrics
 from pathwalker_cli.output.motion_file import read_motion, write_motion
 from pathwalker_cli.output.multipliers_file import read_multipliers, write_multipliers
 from pathwalker_cli.output.recorded_reference import recorded_reference
@@ -46,9 +50,11 @@ __all__ = [
     "PATIENT",
     "Run",
     "check_target",
+    "claimed_run",
     "config_text",
     "default_folder",
     "load_run",
+    "release_runs",
     "repeatable_config",
     "warm_start_run",
     "write_run",
@@ -60,8 +66,6 @@ PATIENT: Final = "patient.yaml"
 """The patient of a run, so that the folder is enough to verify and to repeat it."""
 _METRICS, _MOTION, _RECORDINGS = "metrics.json", "motion.npz", "recordings"
 _MULTIPLIERS: Final = "multipliers.npz"
-_TEXTS: Final = ("input_hashes", "versions", "bound_sources")
-"""Metrics that are texts by key."""
 _SEAL: Final = "NOT_CONVERGED.txt"
 
 ENTRIES: Final = frozenset(
@@ -194,6 +198,7 @@ def check_target(folder: str | Path) -> Path:
     for place in {above, target.parent} if target.exists() else {above}:
         if not os.access(place, os.W_OK | os.X_OK):
             raise DataError("cannot be written", where=str(place), mend=mend)
+    check_room(target)
     names = {path.name for path in target.iterdir()} if target.exists() else set()
     foreign = sorted(names - ENTRIES) if _METRICS in names else sorted(names)
     if foreign:
@@ -202,6 +207,39 @@ def check_target(folder: str | Path) -> Path:
             what, where=str(folder), allowed="a new folder or an earlier run", mend=mend
         )
     return target
+
+
+@contextmanager
+def claimed_run(folder: str | Path, wait: bool = False) -> Iterator[None]:
+    """Keep other processes from writing a run folder meanwhile, and tidy up after killed ones.
+
+    Args:
+        folder: The run folder.
+        wait: Whether to wait for another process that is at work there.
+
+    Raises:
+        DataError: If another process is at work there, or no run can be written there.
+    """
+    target = check_target(folder)
+    with locked(target.with_name(f".{target.name}.lock"), Path(folder), wait):
+        _recover(target)
+        sweep(target.parent, target.name)
+        yield
+
+
+def release_runs(folder: Path) -> None:
+    """Tidy up after killed processes that wrote run folders in a folder."""
+    for lock in folder.glob(".*.lock"):
+        run = folder / lock.name.removeprefix(".").removesuffix(".lock")
+        with suppress(DataError), claimed_run(run):  # who is at work there still, goes on
+            pass
+
+
+def _recover(target: Path) -> None:
+    """Put a run back whose process was killed while it moved another one into its place."""
+    for old in target.parent.glob(f".{glob.escape(target.name)}.????????.tmp/old"):
+        if not target.exists():
+            old.rename(target)
 
 
 @contextmanager
@@ -219,7 +257,9 @@ def _staged(folder: Path) -> Iterator[Path]:
         _exchange(fresh, check_target(folder), staging / "old")
     except OSError as problem:
         reason = problem.strerror or str(problem)
-        raise DataError(f"cannot be written: {reason}", where=str(folder)) from None
+        raise DataError(
+            f"cannot be written: {reason}", where=str(folder), mend="choose another --out"
+        ) from None
     finally:
         if staging is not None:
             shutil.rmtree(staging, ignore_errors=True)
@@ -228,6 +268,8 @@ def _staged(folder: Path) -> Iterator[Path]:
 def _exchange(fresh: Path, target: Path, old: Path) -> None:
     """Move a folder to its place; an older one comes back if that fails."""
     if target.exists():
+        if swapped(fresh, target):
+            return
         target.rename(old)
     try:
         fresh.rename(target)
@@ -298,26 +340,14 @@ def _read_metrics(folder: Path) -> dict[str, Any]:
     """Return the metrics of a run."""
     path = _file(folder, _METRICS)
     metrics = read_json(path, mend="solve again")
-    keys = ("run_format", "problem", "status", "condition", "motion_hash")
-    missing = [key for key in keys if key not in metrics]
-    if missing:
-        raise DataError(f"lacks the key {missing[0]}", where=str(path),
+    if "run_format" not in metrics:
+        raise DataError("lacks the key run_format", where=str(path),
                         allowed="metrics that `pathwalker solve` wrote")  # fmt: skip
-    other = [key for key in keys[1:] if not isinstance(metrics[key], str)]
-    if other:
-        raise DataError(f"{other[0]} is no text", where=str(path), mend="solve again")
-    other = [key for key in _TEXTS if not _holds_texts(metrics.get(key, {}))]
-    if other:
-        raise DataError(f"{other[0]} holds no texts by key", where=str(path), mend="solve again")
     if metrics["run_format"] != RUN_FORMAT:
         raise DataError(f"has run_format {metrics['run_format']}", where=str(path),
                         allowed=str(RUN_FORMAT), mend="solve again")  # fmt: skip
+    validate(metrics, RunMetrics, where=str(path), error=DataError)
     return metrics
-
-
-def _holds_texts(value: Any) -> bool:
-    """Return whether a value maps keys to texts, or to nothing where something is not known."""
-    return isinstance(value, dict) and all(v is None or isinstance(v, str) for v in value.values())
 
 
 def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:

@@ -10,6 +10,8 @@ from typing import Any, Final, Literal
 
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.json_file import read_json
+from pathwalker_cli.io.yaml_file import validate
+from pathwalker_cli.report.summaries import SUMMARIES
 
 __all__ = ["STUDIES", "Kind", "Study", "folder_kind", "sorted_folders", "studies_near"]
 
@@ -142,9 +144,9 @@ def studies_near(
         DataError: If a study that was named stands on none of the runs.
     """
     found: dict[Kind, Study] = {}
-    for kind, file in STUDIES.items():
+    for kind in STUDIES:
         for folder in named.get(kind, ()):
-            study = Study(folder, kind, read_json(folder / file))
+            study = _study(folder, kind)
             if not any(study.stands_on(metrics) for _, metrics in runs):
                 raise DataError(
                     "stands on another optimum than the runs of this report",
@@ -157,10 +159,22 @@ def studies_near(
     for folder, metrics in runs:
         for kind, place in _near_folders(folder):
             with suppress(DataError):  # nobody named it
-                study = Study(place, kind, read_json(place / STUDIES[kind]))
+                study = _study(place, kind)
                 if kind not in found and study.stands_on(metrics):
                     found[kind] = study
     return tuple(found[kind] for kind in STUDIES if kind in found)
+
+
+def _study(folder: Path, kind: Kind) -> Study:
+    """Read the summary of a study.
+
+    Raises:
+        DataError: If it cannot be read, or is not what the command writes.
+    """
+    path = folder / STUDIES[kind]
+    content = read_json(path, mend="make the study again")
+    validate(content, SUMMARIES[kind], where=str(path), error=DataError)
+    return Study(folder, kind, content)
 
 
 def _near_folders(folder: Path) -> list[tuple[Kind, Path]]:

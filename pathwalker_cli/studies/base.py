@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,7 +18,9 @@ from pathwalker_cli.config import (
     with_values,
 )
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.io.atomic import check_room, sweep
 from pathwalker_cli.io.fields import YamlModel
+from pathwalker_cli.io.lock import locked
 from pathwalker_cli.ocp.resolve import Optimum, Resolver
 from pathwalker_cli.output.run_folder import Run, load_run
 from pathwalker_cli.studies.run import RunLog, is_done, run_study
@@ -25,6 +29,7 @@ __all__ = [
     "NeighbourStudy",
     "base_run",
     "check_folder",
+    "claimed_folder",
     "load_study",
     "require_optimum",
     "resolver_of",
@@ -129,6 +134,7 @@ def check_folder(folder: Path, entries: frozenset[str], command: str) -> None:
     """
     if folder.exists() and not folder.is_dir():
         raise DataError("is a file, not a folder", where=str(folder), mend="choose another --out")
+    check_room(folder)
     found = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
     foreign = sorted(name for name in found - entries if not name.startswith("."))
     if foreign:
@@ -138,3 +144,21 @@ def check_folder(folder: Path, entries: frozenset[str], command: str) -> None:
             allowed=f"a new folder, or one that an earlier `pathwalker {command}` began",
             mend="choose another --out",
         )
+
+
+@contextmanager
+def claimed_folder(folder: Path, entries: frozenset[str], command: str) -> Iterator[None]:
+    """Keep other processes out of the folder of a study, and tidy up after killed ones.
+
+    Args:
+        folder: Where results shall go; see `check_folder`.
+        entries: Names of all files and folders that the command writes there.
+        command: The command, for the message.
+
+    Raises:
+        DataError: If it cannot take the results, or another process is at work there.
+    """
+    check_folder(folder, entries, command)
+    with locked(folder / ".lock", folder):
+        sweep(folder, deep=True)
+        yield

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.ocp.processes import called_elsewhere, prepare_worker
 from pathwalker_cli.output.run_folder import load_run
 from pathwalker_cli.studies.base import resolver_of
 from pathwalker_cli.studies.journal import STOPPED, Journal
 from pathwalker_cli.studies.measures import measures
-from pathwalker_cli.studies.processes import end_with_parent
 
 __all__ = ["Job", "Solved", "solve_jobs"]
 
@@ -113,24 +109,11 @@ def _solved_here(jobs: Sequence[Job], origin: _Origin, workers: int) -> Iterator
 
 def _solved_elsewhere(jobs: Sequence[Job], origin: _Origin, workers: int) -> Iterator[Solved]:
     """Yield what other processes solve."""
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        min(workers, len(jobs)), mp_context=context, initializer=_begin, initargs=(origin,)
-    ) as pool:
-        futures = [pool.submit(_in_worker, job) for job in jobs]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        except BrokenProcessPool:
-            raise NotConvergedError(
-                "a process was ended from outside (out of memory?); the same command goes on from "
-                "there, with fewer --workers if need be"
-            ) from None
-        except BaseException as end:
-            pool.shutdown(wait=False, cancel_futures=True)
-            if isinstance(end, KeyboardInterrupt):
-                raise NotConvergedError(STOPPED) from None
-            raise
+    calls = [(job,) for job in jobs]
+    try:
+        yield from called_elsewhere(_in_worker, calls, workers, _begin, (origin,))
+    except KeyboardInterrupt:
+        raise NotConvergedError(STOPPED) from None
 
 
 _KEPT: Final[list[Journal]] = []
@@ -139,9 +122,7 @@ _KEPT: Final[list[Journal]] = []
 
 def _begin(origin: _Origin) -> None:
     """Get a worker process ready."""
-    # Ctrl-C reaches workers too: the solver stops by itself, and between solves the parent decides
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent()
+    prepare_worker()
     _KEPT[:] = [_journal(origin)]
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from pathwalker_cli.config import StudyConfig, study_patient
-from pathwalker_cli.errors import InputError
+from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.ocp.ipopt import ProgressReport
 from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.ocp.solve import GaitSolver
@@ -76,7 +77,8 @@ def run_study(
         log: Is told of every iteration.
 
     Raises:
-        DataError: If the folder holds something else, or the earlier run cannot be used.
+        DataError: If the folder holds something else, or the earlier run cannot be used; if the
+            folder cannot be written in the end, the run is in a temporary one that is named.
     """
     log = log or RunLog()
     check_target(folder)
@@ -86,7 +88,23 @@ def run_study(
     verdict = verdict_of(solution) if study.verdict else None
     lines = [*_log_lines(solution, inputs, log), *_verdict_lines(verdict)]
     more = {"verdict": None if verdict is None else verdict.as_dict()}
-    return Outcome(solution, write_run(folder, solution, lines, inputs, more), verdict)
+    try:
+        metrics = write_run(folder, solution, lines, inputs, more)
+    except DataError as error:
+        place = _kept_elsewhere(folder.name, solution, lines, inputs, more)
+        mend = error.mend if place is None else f"the run is kept in {place}: move it from there"
+        raise DataError(error.what, where=error.where, allowed=error.allowed, mend=mend) from None
+    return Outcome(solution, metrics, verdict)
+
+
+def _kept_elsewhere(name: str, *run: Any) -> Path | None:
+    """Return a temporary folder with what took long to solve, if it can be written at all."""
+    try:
+        place = Path(tempfile.mkdtemp(prefix="pathwalker-")) / name
+        write_run(place, *run)
+    except (DataError, OSError):
+        return None
+    return place
 
 
 def is_done(folder: Path, study: StudyConfig) -> bool:

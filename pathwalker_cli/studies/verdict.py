@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.refusals import dotted
 from pathwalker_cli.model.walker import ANKLES
 from pathwalker_cli.ocp.neighbourhood import Neighbourhood
 from pathwalker_cli.ocp.resolve import Optimum, Resolver
@@ -42,8 +43,6 @@ _DETERMINED: Final = 0.25
 
 _ROUGHLY: Final = 0.75
 """Share of the range of springs up to which a region still says something."""
-
-_Part = TypeVar("_Part")
 
 _CANDIDATES: Final = 2
 """Real springs next to an identified stiffness that are considered."""
@@ -214,27 +213,33 @@ def verdict_of_metrics(metrics: Mapping[str, Any]) -> Verdict | None:
     plain = metrics.get("verdict")
     if plain is None:
         return None
+    where, mend = "verdict in metrics.json", "solve again"
     try:
-        snapped = plain["snapped"]
-        return Verdict(
-            springs=tuple(_part(SpringVerdict, each) for each in plain["springs"]),
-            stops=tuple(_part(StopVerdict, each) for each in plain["stops"]),
-            snapped=None if snapped is None else _part(SnappedSprings, snapped),
-            optima=tuple(_part(LocalOptimum, each) for each in plain["optima"]),
-            **{name: plain[name] for name in ("starts", "solves", "seconds")},
-        )
-    except (KeyError, TypeError, AttributeError) as problem:
-        what = f"is not what `pathwalker solve` wrote: {problem}"
-        raise DataError(what, where="verdict in metrics.json", mend="solve again") from None
+        verdict = TypeAdapter(Verdict).validate_python(plain)
     except ValidationError as problem:
-        what = f"holds a value of another type: {problem.errors()[0]['msg'].lower()}"
-        raise DataError(what, where="verdict in metrics.json", mend="solve again") from None
+        first = problem.errors()[0]
+        what = f"{dotted(first['loc'])}: {first['msg'].lower()}"
+        raise DataError(what, where=where, mend=mend) from None
+    what = _contradiction(verdict)
+    if what:
+        raise DataError(what, where=where, mend=mend)
+    return verdict
 
 
-def _part(kind: type[_Part], plain: Mapping[str, Any]) -> _Part:
-    """Return a dataclass from plain values of its types; what it does not hold is left."""
-    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
-    return TypeAdapter(kind).validate_python({name: plain[name] for name in names})
+def _contradiction(verdict: Verdict) -> str:
+    """Return what cannot be in a verdict that was read, "" if it is in order."""
+    names = {spring.spring for spring in verdict.springs}
+    snapped = verdict.snapped
+    if not names <= set(STIFFNESSES):
+        return f"names the spring {min(names - set(STIFFNESSES))}"
+    if snapped is not None and not snapped.names.keys() == snapped.stiffness.keys() == names:
+        return "chooses real springs for others than were identified"
+    if any(len(optimum.stiffness) < len(names) for optimum in verdict.optima):
+        return "holds an optimum that lacks a stiffness"
+    for spring in verdict.springs:
+        if spring.range[0] >= spring.range[1] or spring.limit not in ("", "lower", "upper"):
+            return f"holds a range or a limit of {spring.spring} that is none"
+    return ""
 
 
 class _Judge:

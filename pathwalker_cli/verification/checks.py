@@ -13,6 +13,7 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.special import refuse_special
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.balance import balance
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -126,6 +127,7 @@ def _files(run: Run, series: GaitSeries) -> Iterator[Check]:
     hashes = run.metrics["input_hashes"]
     for name, key in ((CONFIG, "config"), (PATIENT, "patient_kept")):
         if key in hashes:
+            refuse_special(run.folder / name)
             yield _as_written(name, hashes[key], sha256((run.folder / name).read_bytes()))
     kept = run.metrics.get(METRICS_HASH)
     yield _as_written("metrics.json, all of it", kept, metrics_hash(run.metrics))

@@ -8,14 +8,13 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from typing import Final
 
 from pebble import ProcessExpired, ProcessPool
 
 from pathwalker_cli.ocp.machine import use_one_blas_thread
+from pathwalker_cli.ocp.processes import deaf, prepare_worker
 from pathwalker_cli.studies.batch.worker import LOST, Result, Task, Work, failure
-from pathwalker_cli.studies.processes import end_with_parent
 
 __all__ = ["LocalPool"]
 
@@ -65,7 +64,7 @@ class LocalPool:
         waiting, running = deque(tasks), dict[Future[Result], str]()
         count = min(self._count, len(tasks))
         context = multiprocessing.get_context("spawn")
-        pool = ProcessPool(max_workers=count, initializer=_prepare, context=context)
+        pool = ProcessPool(max_workers=count, initializer=prepare_worker, context=context)
         try:
             while (waiting or running) and pool.active:
                 while waiting and len(running) < count:
@@ -80,14 +79,14 @@ class LocalPool:
                     else:
                         yield name, result
         finally:
-            with _deaf():
+            with deaf():  # within the pool it could leave a lock held, and the pool never end
                 pool.stop()
                 pool.join()
         lost |= dict.fromkeys([*running.values(), *(task.name for task in waiting)], NO_WORKERS)
 
     def _submit(self, pool: ProcessPool, task: Task, work: Work) -> Future[Result]:
         arguments = (task.config, task.folder, task.warm_start)
-        with _deaf():
+        with deaf():
             return pool.schedule(work, args=arguments, timeout=self._time_limit)
 
     def _result(self, future: Future[Result]) -> Result:
@@ -115,19 +114,3 @@ def _death(error: ProcessExpired | BrokenProcessPool) -> str:
     if code >= 0:
         return f"the worker ended with exit code {code}"
     return f"the worker was ended by {signal.Signals(-code).name}; did memory run out?"
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Put Ctrl-C off: within the pool it could leave a lock held, and the pool never end."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _prepare() -> None:
-    """Make a worker deaf to Ctrl-C, which is for the parent, and end it with its parent."""
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    end_with_parent()

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.io.atomic import sweep
+from pathwalker_cli.io.lock import locked
+from pathwalker_cli.output.run_folder import release_runs
 from pathwalker_cli.studies.base import check_folder
 from pathwalker_cli.studies.batch.cases import Case
 from pathwalker_cli.studies.batch.ledger import CASES, ENTRIES, Ended, Ledger
-from pathwalker_cli.studies.batch.lock import locked
 from pathwalker_cli.studies.batch.worker import Pool, Task, Work, solve_case
 
 __all__ = ["Report", "Watch", "run_batch"]
@@ -62,10 +63,11 @@ def run_batch(
         NotConvergedError: If the user stopped it.
     """
     check_folder(folder, ENTRIES, "batch")
-    with locked(folder):
+    with locked(folder / ".lock", folder):
         place = folder.resolve()
         ledger = Ledger(cases, place)
-        _sweep(place / CASES)
+        sweep(place)
+        release_runs(place / CASES)
         waiting = ledger.recall()
         watch.begin(len(cases), len(cases) - len(waiting), pool.workers)
         tasks = [_task(case, ledger.run_folder(case)) for case in waiting]
@@ -79,7 +81,7 @@ def run_batch(
                 "goes on from there"
             ) from None
         finally:
-            _sweep(place / CASES)
+            release_runs(place / CASES)
     return Report(folder, ledger.ended)
 
 
@@ -87,9 +89,3 @@ def _task(case: Case, folder: Path) -> Task:
     """Return a case in plain words."""
     start = "" if case.warm_start is None else str(case.warm_start)
     return Task(case.name, case.config.model_dump_json(), str(folder), start)
-
-
-def _sweep(folder: Path) -> None:
-    """Take away what workers that were stopped had begun to write."""
-    for left in folder.glob(".*.tmp"):
-        shutil.rmtree(left, ignore_errors=True)

@@ -99,11 +99,14 @@ def _solved(config: str, folder: str, warm_start: str) -> Result:
     """Solve a case; heavy libraries are loaded here, where they are needed."""
     try:
         from pathwalker_cli.config import StudyConfig
+        from pathwalker_cli.output.run_folder import claimed_run
         from pathwalker_cli.studies.run import is_done, run_study
 
         study = StudyConfig.model_validate_json(config, strict=True)
-        if not is_done(Path(folder), study):  # Dask repeats a task if its result gets lost
-            run_study(study, Path(folder), Path(warm_start) if warm_start else None)
+        # Dask repeats a task if its result gets lost, and ends none whose caller was killed
+        with claimed_run(folder, wait=True):
+            if not is_done(Path(folder), study):
+                run_study(study, Path(folder), Path(warm_start) if warm_start else None)
     except PathwalkerError as error:
         return failure(str(error))
     except Exception as error:

@@ -1,0 +1,88 @@
+"""What the summaries of studies must hold, as far as a page shows it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from pathwalker_cli.io.fields import invalid
+from pathwalker_cli.studies.measures import MEASURES
+
+__all__ = ["SUMMARIES"]
+
+Number = float | None
+Numbers = dict[str, Number]
+Pair = tuple[float, float]
+
+
+def _known(key: str) -> str:
+    if key not in {measure.key for measure in MEASURES}:
+        raise invalid(f"is '{key}', which is no measure", allowed="a spring of the orthoses")
+    return key
+
+
+class _Summary(BaseModel):
+    """Further entries may be anything."""
+
+    model_config = ConfigDict(extra="allow")
+
+
+class _Moved(_Summary):
+    spring: Annotated[str, AfterValidator(_known)]
+    factor: float
+    stiffness: float
+    status: str
+    changes: Numbers
+    note: str
+
+
+class _Perturbation(_Summary):
+    problem: str
+    patient: str
+    optimum: Numbers
+    rows: list[_Moved]
+
+
+class _Sensitivity(_Summary):
+    problem: str
+    patient: str
+    optimum: Numbers
+    elasticities: dict[str, Numbers]
+
+
+class _Point(_Summary):
+    dorsiflexion_stiffness: Number
+    plantarflexion_stiffness: Number
+    measures: Numbers
+
+
+class _Best(_Summary):
+    dorsiflexion_stiffness: float
+    plantarflexion_stiffness: float
+
+
+class _Region(_Summary):
+    dorsiflexion_stiffness: Pair
+    plantarflexion_stiffness: Pair
+    share_of_points: float
+
+
+class _Landscape(_Summary):
+    problem: str
+    patient: str
+    side: str
+    tolerance: Annotated[float, Field(ge=0.0)]
+    dorsiflexion_stiffness: list[float]
+    plantarflexion_stiffness: list[float]
+    start: _Point
+    best: _Best
+    region: _Region | None
+
+
+SUMMARIES: Final[dict[str, type[BaseModel]]] = {
+    "perturb": _Perturbation,
+    "sensitivity": _Sensitivity,
+    "landscape": _Landscape,
+}
+"""Model of the summary by the command that writes it."""
