@@ -80,9 +80,52 @@ class _Landscape(_Summary):
     region: _Region | None
 
 
+class _FrontPoint(_Summary):
+    walking_speed_weight: float
+    status: str
+    mesh: str | None
+    measures: dict[str, float]
+    errors: tuple[Number, Number]
+    intervals: int
+    cost_on_base_mesh: Number
+    local_optima: int
+    iterations: int
+
+
+class _Tradeoff(_Summary):
+    problem: str
+    patient: str
+    condition: str
+    points: Annotated[list[_FrontPoint], Field(min_length=1)]
+    base_weight: float
+    optimum: Numbers
+    recorded_walking_speed: Pair | None
+    tolerances: Pair
+
+
+class _Spread(_Summary):
+    quantiles: Numbers
+    share_at_lower_limit: Number
+    share_at_upper_limit: Number
+    strongest_input: str | None
+    rank_correlation: Number
+
+
+class _Uncertainty(_Summary):
+    problem: str
+    patient: str
+    draws: Annotated[int, Field(ge=0)]
+    failed: list[str]
+    base: Numbers
+    stiffness_ranges: dict[Annotated[str, AfterValidator(_known)], Pair]
+    spreads: dict[Annotated[str, AfterValidator(_known)], _Spread]
+
+
 SUMMARIES: Final[dict[str, type[BaseModel]]] = {
     "perturb": _Perturbation,
     "sensitivity": _Sensitivity,
     "landscape": _Landscape,
+    "tradeoff": _Tradeoff,
+    "uncertainty": _Uncertainty,
 }
 """Model of the summary by the command that writes it."""

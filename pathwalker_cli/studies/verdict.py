@@ -237,7 +237,7 @@ def _contradiction(verdict: Verdict) -> str:
     if any(len(optimum.stiffness) < len(names) for optimum in verdict.optima):
         return "holds an optimum that lacks a stiffness"
     for spring in verdict.springs:
-        if spring.range[0] >= spring.range[1] or spring.limit not in ("", "lower", "upper"):
+        if spring.range[0] > spring.range[1] or spring.limit not in ("", "lower", "upper"):
             return f"holds a range or a limit of {spring.spring} that is none"
     return ""
 
