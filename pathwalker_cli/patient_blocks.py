@@ -5,7 +5,7 @@ SI units and radians; angles carry the signs of `conventions` (+ankle = plantarf
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import Field, field_validator, model_validator
 
@@ -160,6 +160,10 @@ class SpringSet(YamlModel):
         return value
 
 
+_PLAY_ROOM: Final = 1.1
+"""Free plays between neutral angle and stop that the knots of the torque-angle curve need."""
+
+
 class OrthosisData(YamlModel):
     """Ankle-foot orthosis: geometry and springs, angles in rad (+ = plantarflexion)."""
 
@@ -206,14 +210,15 @@ class OrthosisData(YamlModel):
 
     @model_validator(mode="after")
     def _stops(self) -> OrthosisData:
-        half = self.free_play / 2.0
+        room = _PLAY_ROOM * self.free_play
         for side in SIDES:
             low, high = self.dorsiflexion_stop[side], self.plantarflexion_stop[side]
-            if not low < self.neutral_angle - half < self.neutral_angle + half < high:
+            if not low + room <= self.neutral_angle <= high - room:
                 raise invalid(
                     f"has neutral_angle {self.neutral_angle:g} rad with free_play "
                     f"{self.free_play:g} rad, not between the {side} stops",
-                    allowed=f"between {low:g} and {high:g} rad",
+                    allowed=f"between {low:g} and {high:g} rad, {_PLAY_ROOM:g} times the free play "
+                    "away from both",
                 )
         return self
 

@@ -16,7 +16,7 @@ from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.curves import evaluate
 from pathwalker_cli.model.muscle import activation_rate, curves_of, excitation_from_rate
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
+from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_curve, orthosis_torque
 from pathwalker_cli.model.walker import Walker
 from published_rows import ROWS, PublishedRow
 
@@ -107,6 +107,32 @@ def test_orthosis_is_the_same_in_numpy_and_casadi() -> None:
     for angle in np.linspace(-0.4, 0.4, 41):
         symbolic = float(function(angle, 37.0, 11.0))
         assert symbolic == pytest.approx(float(orthosis_torque(LEFT, angle, 37.0, 11.0)), abs=1e-12)
+
+
+@pytest.mark.parametrize("k_d", [1.0, 99.9, 100.0, 150.0, 199.999999, 200.0, 250.0, 400.0, 700.0])
+@pytest.mark.parametrize("k_p", [5.0, 200.0, 600.0])
+def test_orthosis_is_a_curve_with_springs_of_any_stiffness(k_d: float, k_p: float) -> None:
+    """At 200 N m/rad a spring is as stiff as its stop, and as the rise of its preload."""
+    chain = orthosis_curve(RIGHT, k_d, k_p)
+    for i in range(len(chain.x) - 1):
+        a, b = chain.controls(i)
+        assert 0.0 <= a <= 0.7
+        assert 0.3 <= b <= 1.0
+    torque = orthosis_torque(RIGHT, np.linspace(-0.3, 0.3, 6001), k_d, k_p)
+    assert np.diff(torque).max() < 0.0
+
+
+@pytest.mark.parametrize("preload", [0.0, 1.0])
+def test_orthosis_is_smooth_in_its_stiffness(preload: float) -> None:
+    side = replace(RIGHT, preload_torque=preload)
+    angle, k_d = ca.SX.sym("angle"), ca.SX.sym("k_d")
+    bend, slope = ca.hessian(orthosis_torque(side, angle, k_d, 60.0), k_d)
+    function = ca.Function("torque", [angle, k_d], [slope, bend])
+    h = 1e-3
+    for at in (-0.16, -0.131, -0.028, -0.023, -0.021, -0.012):
+        for edge in (100.0, 200.0):
+            below, above = (np.array(function(at, edge + k)).ravel() for k in (-h, h))
+            assert above == pytest.approx(below, abs=1e-6), (at, edge)
 
 
 @pytest.mark.parametrize("name", GENERATORS[:6])

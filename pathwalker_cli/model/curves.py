@@ -33,6 +33,8 @@ class BezierChain:
         slopes: Slopes dy/dx at the knots, n of them.
         curviness: Fraction c of the way from each end point to the corner, in (0, 1).
         newton_steps: Newton steps for the curve parameter, see `newton_steps_for`.
+        corners: Where the end tangents of every piece meet, n - 1 of them, for curves that may
+            be straight: there tangents of almost equal slope do not tell.
     """
 
     x: Sequence[Any]
@@ -40,6 +42,7 @@ class BezierChain:
     slopes: Sequence[Any]
     curviness: float
     newton_steps: int = _MOST_NEWTON_STEPS
+    corners: Sequence[Any] | None = None
 
     @property
     def is_numeric(self) -> bool:
@@ -49,10 +52,11 @@ class BezierChain:
 
     def corner(self, i: int) -> Any:
         """Return the x at which the end tangents of piece i meet; its middle if they coincide."""
+        if self.corners is not None:
+            return self.corners[i]
         x0, x1 = self.x[i], self.x[i + 1]
         turn = self.slopes[i] - self.slopes[i + 1]
-        straight = turn.is_zero() if isinstance(turn, ca.SX) else turn == 0
-        if straight:
+        if isinstance(turn, float) and turn == 0:
             return (x0 + x1) / 2
         rise = self.y[i + 1] - self.y[i]
         return (rise - x1 * self.slopes[i + 1] + x0 * self.slopes[i]) / turn

@@ -17,6 +17,12 @@ _CURVINESS: Final = 0.7
 _BLEND: Final = 0.1
 """Part of the way from free play to hard stop over which spring and stop are blended."""
 
+_STEEP: Final = 0.5
+"""Stiffness, as a share of 2 tau_0/theta_W, up to which the preload rises with 4 tau_0/theta_W."""
+
+_NO_PRELOAD: Final = 1e-12
+"""Keeps the ratio of an orthosis without preload finite [N m]."""
+
 
 @dataclass(frozen=True)
 class OrthosisSide:
@@ -56,12 +62,20 @@ def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:
 
     Returns:
         Seven knots: stop, spring, edge of free play, neutral angle, and back again.
+
+    The reference's slope at the neutral angle, 4 tau_0/theta_W, makes a curve only for springs
+    that are softer than the rise of the preload, 2 tau_0/theta_W: the end tangents of stiffer
+    ones meet outside their piece. Up to half of that stiffness the slope is the reference's;
+    from there to equal stiffness it falls to 2 tau_0/theta_W, and stays there.
     """
     middle, play, preload = side.neutral_angle, side.free_play, side.preload_torque
     reach_d = (middle - play / 2) - side.dorsiflexion_stop
     reach_p = side.plantarflexion_stop - (middle + play / 2)
     over_d = _BLEND * (preload + reach_d * k_d)
     over_p = _BLEND * (preload + reach_p * k_p)
+    steep_d, meeting_d = _preload_rise(play, preload, k_d)
+    steep_p, meeting_p = _preload_rise(play, preload, k_p)
+    steep = steep_d * steep_p
     stop_d, stop_p = side.dorsiflexion_stop_stiffness, side.plantarflexion_stop_stiffness
     x = [
         side.dorsiflexion_stop - over_d / stop_d,
@@ -81,8 +95,34 @@ def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:
         preload + (1 - _BLEND) * reach_p * k_p,
         preload + reach_p * k_p + over_p,
     ]
-    slopes = [stop_d, k_d, k_d, 4 * preload / play, k_p, k_p, stop_p]
-    return BezierChain(x, y, slopes, _CURVINESS)
+    slopes = [stop_d, k_d, k_d, 2 * (1 + steep) * preload / play, k_p, k_p, stop_p]
+    # of the way from the edge of free play to the neutral angle
+    share_d, share_p = (
+        (1 + 2 * q) / (2 + 2 * q) for q in (meeting_d * steep_p, meeting_p * steep_d)
+    )
+    corners = [
+        side.dorsiflexion_stop,
+        (x[1] + x[2]) / 2,
+        x[2] + share_d * play,
+        x[4] - share_p * play,
+        (x[4] + x[5]) / 2,
+        side.plantarflexion_stop,
+    ]
+    return BezierChain(x, y, slopes, _CURVINESS, corners=corners)
+
+
+def _preload_rise(play: Any, preload: Any, stiffness: Any) -> tuple[Any, Any]:
+    """Return how far the rise of the preload is the reference's, s, and s / (1 - r).
+
+    With r = K theta_W / (2 tau_0), s(r) is 1 up to r_0 = `_STEEP`, 0 from 1 on, and a smoothstep
+    of seventh degree between, whose fourfold zero keeps s / (1 - r) C2.
+    """
+    ratio = stiffness * play / (2 * preload + _NO_PRELOAD)
+    soft = ratio < _STEEP
+    between = (1 - soft) * (ratio < 1)
+    way = between * (ratio - _STEEP) / (1 - _STEEP)
+    rest = between * (1 - way) ** 3 * (1 + 4 * way + 10 * way**2 + 20 * way**3)
+    return soft + rest * (1 - way), soft / (1 - soft * ratio) + rest / (1 - _STEEP)
 
 
 def orthosis_torque(side: OrthosisSide, angle: Any, k_d: Any, k_p: Any) -> Any:
