@@ -5,7 +5,7 @@ SI units and radians; angles carry the signs of `conventions` (+ankle = plantarf
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import Field, field_validator, model_validator
 
@@ -160,6 +160,16 @@ class SpringSet(YamlModel):
         return value
 
 
+_ROUGH: Final = (0.49, 1.51)
+"""Stiffnesses, as shares of the slope at the neutral angle, between which springs are too near it:
+the tangents of the torque curve meet in the outermost hundredth between two knots, or beyond."""
+_STEEPEST: Final = 250.0
+"""Largest ratio of the stiffnesses of stop and spring at which the torque is exact."""
+_STOP_CLEARANCE: Final = 1.06
+"""Least distance of a stop from the neutral angle, in plays: the knots of the curve are in order
+from 19 / 18 on."""
+
+
 class OrthosisData(YamlModel):
     """Ankle-foot orthosis: geometry and springs, angles in rad (+ = plantarflexion)."""
 
@@ -206,16 +216,60 @@ class OrthosisData(YamlModel):
 
     @model_validator(mode="after")
     def _stops(self) -> OrthosisData:
-        half = self.free_play / 2.0
+        clearance = _STOP_CLEARANCE * self.free_play
         for side in SIDES:
             low, high = self.dorsiflexion_stop[side], self.plantarflexion_stop[side]
-            if not low < self.neutral_angle - half < self.neutral_angle + half < high:
+            if not low < self.neutral_angle - clearance < self.neutral_angle + clearance < high:
                 raise invalid(
                     f"has neutral_angle {self.neutral_angle:g} rad with free_play "
                     f"{self.free_play:g} rad, not between the {side} stops",
-                    allowed=f"between {low:g} and {high:g} rad",
+                    allowed=f"between {low:g} and {high:g} rad, {clearance:g} rad from either",
                 )
         return self
+
+    @model_validator(mode="after")
+    def _smooth(self) -> OrthosisData:
+        for kind in ("dorsiflexion", "plantarflexion"):
+            fault = self.spring_fault(kind, *getattr(self.stiffness_range, kind))
+            if fault is not None:
+                what, allowed = fault
+                raise invalid(f"has stiffness_range.{kind} {what}", allowed=allowed)
+        return self
+
+    def spring_fault(self, kind: str, low: float, high: float) -> tuple[str, str] | None:
+        """Return why the torque curve cannot be smooth with springs of a range, if it cannot.
+
+        Between two knots the tangents must meet: from the neutral angle, where the slope is
+        4 preload / play, to the spring they do so only if the spring is softer than half of that
+        slope or stiffer than one and a half times it.
+
+        Args:
+            kind: "dorsiflexion" or "plantarflexion".
+            low: Softest spring [N m/rad].
+            high: Stiffest spring [N m/rad].
+
+        Returns:
+            What is wrong, without the name of the range, and what is allowed; None if it is fine.
+        """
+        play, preload = self.free_play, self.preload_torque
+        soft, stiff = (share * 4.0 * preload / play for share in _ROUGH)
+        if low < stiff and high > soft:
+            most, least = (k * play / (4.0 * share) for k, share in ((low, 1.52), (high, 0.48)))
+            return (
+                f"[{low:g}, {high:g}] N m/rad, for which preload_torque {preload:g} N m over "
+                f"free_play {play:g} rad gives no smooth torque",
+                f"preload_torque up to {most:.3g} N m or from {least:.3g} N m on",
+            )
+        stop = getattr(self.stop_stiffness, kind)
+        for side in SIDES:
+            edge = getattr(self, f"{kind}_stop")[side]
+            preloaded = preload / (abs(edge - self.neutral_angle) - play / 2.0)
+            if not stop / _STEEPEST <= low + preloaded <= high + preloaded <= stop * _STEEPEST:
+                return (
+                    f"[{low:g}, {high:g}] N m/rad, too far from stop_stiffness.{kind} {stop:g}",
+                    f"springs within a factor of {_STEEPEST:g} of the stop",
+                )
+        return None
 
 
 Speed = Annotated[float, Quantity("m/s", 0.0, 5.0, above="is it in km/h or cm/s?")]
