@@ -149,8 +149,9 @@ def read_c3d(path: str | Path) -> Recording:
     parameters = content["parameters"]
     rate = float(_value(parameters, "POINT", "RATE", path)[0])
     first_frame = int(content["header"]["points"]["first_frame"]) + 1
-    labels = _value(parameters, "POINT", "LABELS", path)
     points = content["data"]["points"]
+    # labels beyond the last point name nothing
+    labels = _value(parameters, "POINT", "LABELS", path)[: points.shape[1]]
     samples = content["data"]["analogs"].shape[2]
     return Recording(
         name=path.stem,
