@@ -123,6 +123,8 @@ def test_segment_masses_add_up_to_the_body(patient: Patient) -> None:
 def test_mass_matrix_is_symmetric_and_positive(
     patient: Patient, seed: int, condition: Condition
 ) -> None:
+    for part in segments(patient, condition):
+        assert 0.0 < 2 * max(part.inertia) <= (1 + 1e-12) * sum(part.inertia), part.name
     walker = build_walker(patient, condition)
     q, v = pose(seed)
     mass, *_ = dynamics(walker, q, v)

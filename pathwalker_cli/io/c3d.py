@@ -191,7 +191,7 @@ def _probe(path: Path) -> None:
     words = [sys.executable, "-P", "-c", _PROBE, str(path.resolve())]
     what = ""
     try:
-        done = subprocess.run(
+        done = subprocess.run(  # noqa: S603 - this Python, a text of this module, and a path
             words, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=_LONGEST
         )
         if done.returncode == _TOO_LARGE:
