@@ -452,6 +452,8 @@ def check_smooth(chain: BezierChain, tolerance: float = 1e-4) -> None:
     for i, width in enumerate(widths):
         inner, h = x[i] + width * np.linspace(0.02, 0.98, 25), 1e-5 * width
         point, up, down = (evaluate(chain, inner + k) for k in (0.0, h, -h))
+        settled = evaluate(replace(chain, newton_steps=30), inner)
+        assert point.value == pytest.approx(settled.value, rel=0, abs=1e-9 * np.abs(y).max())
         noise = 1e-13 * np.abs(y).max() / h
         slope = (up.value - down.value) / (2 * h)
         assert slope == pytest.approx(point.slope, abs=tolerance * steepest + noise)
@@ -468,6 +470,17 @@ SOFT_PRELOAD: Final = {**USUAL, "preload_torque": 0.1}
 """The tangents of play and springs do not meet in between: torques of millions of N m."""
 WIDE_PLAY: Final = {**USUAL, "free_play": 0.1, "dorsiflexion_stop": -0.1, "preload_torque": 20.0}
 """The play reaches beyond the beginning of the stop."""
+
+
+def between_springs(low: float, high: float) -> dict[str, Any]:
+    """Return an orthosis with springs of a range for K_D, whose play has a slope of 100 N m/rad."""
+    ranges = {**USUAL["stiffness_range"], "dorsiflexion": [low, high], "plantarflexion": [5.0, 9.0]}
+    guess = {"dorsiflexion": low, "plantarflexion": 5.0}
+    return {
+        **USUAL, "preload_torque": 0.25, "stiffness_range": ranges, "stiffness_guess": guess
+    }  # fmt: skip
+
+
 HARD_STOP: Final = {
     **USUAL,
     "preload_torque": 0.0,
@@ -481,6 +494,8 @@ HARD_STOP: Final = {
 @example(worn=SOFT_PRELOAD, share=0.5)
 @example(worn=WIDE_PLAY, share=0.5)
 @example(worn=HARD_STOP, share=0.0)
+@example(worn=between_springs(5.0, 49.0), share=1.0)
+@example(worn=between_springs(151.0, 300.0), share=0.0)
 @example(worn={**USUAL, "preload_torque": 0.0}, share=0.5)
 @example(worn=USUAL, share=0.0)
 def test_torque_of_an_orthosis_is_smooth_and_restoring(worn: dict[str, Any], share: float) -> None:
@@ -505,6 +520,8 @@ def test_torque_of_an_orthosis_is_smooth_and_restoring(worn: dict[str, Any], sha
     ("worn", "said"),
     [
         (SOFT_PRELOAD, "gives no smooth torque.*up to 0.00822 N m or from 0.479 N m on"),
+        (between_springs(5.0, 52.0), "gives no smooth torque"),
+        (between_springs(148.0, 300.0), "gives no smooth torque"),
         (WIDE_PLAY, "not between the right stops"),
         (HARD_STOP, "too far from stop_stiffness.dorsiflexion 1000"),
     ],
