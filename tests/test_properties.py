@@ -564,7 +564,10 @@ def test_torque_of_an_orthosis_is_smooth_in_its_springs(worn: dict[str, Any], se
         chain = orthosis_curve(side, *k)
         knots, steepest = np.array(chain.x), np.abs(chain.slopes).max()
         between = knots[:-1] + np.diff(knots) * rng.random(6)
-        width = np.concatenate([np.repeat(np.diff(knots).min(), 7), np.diff(knots)])
+        # a curve bends within the distance of its corner from the nearer knot
+        corners = np.array([chain.corner(i) for i in range(6)])
+        sharp = np.minimum(corners - knots[:-1], knots[1:] - corners)
+        width = np.concatenate([np.repeat(sharp.min(), 7), sharp])
         for angle, near in zip([*knots, *between], width, strict=True):
             x = np.array([angle, *k])
             value, slope, bend = (np.asarray(part) for part in function(x, numbers))
