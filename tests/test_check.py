@@ -354,8 +354,12 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
         ("study.yaml", "bounds.friction", "is not a finite number"),
     ),
     "springs that do not exist": (
-        lambda f: config_of(f, bounds={"dorsiflexion_stiffness": [200.0, 400.0]}),
+        lambda f: config_of(f, bounds={"dorsiflexion_stiffness": [100.0, 180.0]}),
         ("study.yaml: bounds.dorsiflexion_stiffness", "no real spring", "within 5 to 92 N m/rad"),
+    ),
+    "springs too stiff for the preload": (
+        lambda f: config_of(f, bounds={"dorsiflexion_stiffness": [200.0, 400.0]}),
+        ("study.yaml: bounds.dorsiflexion_stiffness: is [200, 400] N m/rad", "no smooth torque"),
     ),
     "one spring that does not exist": (
         lambda f: config_of(f, bounds={"stiffness": {"plantarflexion_stiffness_left": [2.0, 3.0]}}),

@@ -184,7 +184,8 @@ def _stiffness(
         pair = given or getattr(real, kind)
         fault = orthosis.spring_fault(kind, *pair)
         if fault is not None:
-            raise ConfigError(f"has {name} {fault[0]}", where="bounds", allowed=fault[1])
+            key = f"stiffness.{name}" if name in config.stiffness else f"{kind}_stiffness"
+            raise ConfigError(f"is {fault[0]}", where=f"bounds.{key}", allowed=fault[1])
         entries[(name,)] = pair
         reason = "from the config" if given else f"real springs: {real.source}"
         sources[name] = f"[{pair[0]:g}, {pair[1]:g}] N m/rad, {reason}"
