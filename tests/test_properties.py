@@ -70,11 +70,13 @@ from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.ocp.series import gait_series
 from pathwalker_cli.ocp.symmetry import asymmetries, full_stride
 from pathwalker_cli.output.cycle import BOTH_SIDES, own_cycle
+from pathwalker_cli.output.metrics import gait_metrics
 from pathwalker_cli.output.motion_file import read_motion, write_motion
 from pathwalker_cli.output.orthosis_text import angle_words
 from pathwalker_cli.output.recorded_files import write_strengths_yaml
 from pathwalker_cli.output.run_folder import config_text
 from pathwalker_cli.output.run_metrics import run_inputs
+from pathwalker_cli.output.text import summary_rows
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient_blocks import OrthosisData
 from pathwalker_cli.trajectory import Trajectory
@@ -84,6 +86,7 @@ NUMBERS: Final = st.floats(-1e6, 1e6, allow_subnormal=False)
 ORDER: Final = mirror_permutation(COORDINATES)
 POINT_ORDER: Final = [4, 5, 6, 7, 0, 1, 2, 3]
 """Right heel and toe, x and z, after the left ones."""
+WEIGHTS_END: Final = "_body_weights"
 WRITTEN: Final = 1e-8
 """Nine digits of every number reach the rigid bodies."""
 
@@ -290,6 +293,21 @@ def test_angles_come_back_from_degrees(angle: float) -> None:
     assert said is not None
     sign = 1.0 if said[2] == "plantarflexion" else -1.0
     assert sign * np.deg2rad(float(said[1])) == pytest.approx(angle, abs=np.deg2rad(0.0501))
+
+
+@given(stiffness=st.floats(1.0, 1000.0), share=st.floats(0.1, 10.0))
+def test_stiffness_per_degree_and_body_weights(stiffness: float, share: float) -> None:
+    series = stylised_series()
+    found = gait_metrics(replace(series, force=share * series.force)).as_dict()
+    for side in SIDES:
+        force, weights = (found[f"peak_vertical_force_{side}{end}"] for end in ("", WEIGHTS_END))
+        assert weights * found["body_weight"] == pytest.approx(force, rel=1e-12)
+        assert force == pytest.approx(share * series.vertical_force(side).max(), rel=1e-12)
+    rows = dict(summary_rows({**found, "dorsiflexion_stiffness_left": stiffness}, "converged"))
+    said = re.fullmatch(r"([\d.]+) N m/rad \(([\d.]+) N m/deg\)", rows["K_D left"])
+    assert said is not None
+    assert float(said[1]) == pytest.approx(stiffness, abs=0.0501)
+    assert to_degrees(float(said[2])) == pytest.approx(stiffness, abs=to_degrees(0.00501))
 
 
 @given(patient=patients(), worn=orthoses())
