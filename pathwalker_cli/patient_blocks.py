@@ -160,8 +160,11 @@ class SpringSet(YamlModel):
         return value
 
 
-_PLAY_ROOM: Final = 1.1
-"""Free plays between neutral angle and stop that the knots of the torque-angle curve need."""
+_STEEPEST: Final = 250.0
+"""Largest ratio of the stiffnesses of stop and spring at which the torque is exact."""
+_STOP_CLEARANCE: Final = 1.06
+"""Least distance of a stop from the neutral angle, in plays: the knots of the curve are in order
+from 19 / 18 on."""
 
 
 class OrthosisData(YamlModel):
@@ -210,17 +213,47 @@ class OrthosisData(YamlModel):
 
     @model_validator(mode="after")
     def _stops(self) -> OrthosisData:
-        room = _PLAY_ROOM * self.free_play
+        clearance = _STOP_CLEARANCE * self.free_play
         for side in SIDES:
             low, high = self.dorsiflexion_stop[side], self.plantarflexion_stop[side]
-            if not low + room <= self.neutral_angle <= high - room:
+            if not low < self.neutral_angle - clearance < self.neutral_angle + clearance < high:
                 raise invalid(
                     f"has neutral_angle {self.neutral_angle:g} rad with free_play "
                     f"{self.free_play:g} rad, not between the {side} stops",
-                    allowed=f"between {low:g} and {high:g} rad, {_PLAY_ROOM:g} times the free play "
-                    "away from both",
+                    allowed=f"between {low:g} and {high:g} rad, {clearance:g} rad from either",
                 )
         return self
+
+    @model_validator(mode="after")
+    def _exact(self) -> OrthosisData:
+        for kind in ("dorsiflexion", "plantarflexion"):
+            fault = self.spring_fault(kind, *getattr(self.stiffness_range, kind))
+            if fault is not None:
+                what, allowed = fault
+                raise invalid(f"has stiffness_range.{kind} {what}", allowed=allowed)
+        return self
+
+    def spring_fault(self, kind: str, low: float, high: float) -> tuple[str, str] | None:
+        """Return why the torque curve would not be exact with springs of a range, if so.
+
+        Args:
+            kind: "dorsiflexion" or "plantarflexion".
+            low: Softest spring [N m/rad].
+            high: Stiffest spring [N m/rad].
+
+        Returns:
+            What is wrong, without the name of the range, and what is allowed; None if it is fine.
+        """
+        stop = getattr(self.stop_stiffness, kind)
+        for side in SIDES:
+            reach = abs(getattr(self, f"{kind}_stop")[side] - self.neutral_angle)
+            preloaded = self.preload_torque / (reach - self.free_play / 2.0)
+            if not stop / _STEEPEST <= low + preloaded <= high + preloaded <= stop * _STEEPEST:
+                return (
+                    f"[{low:g}, {high:g}] N m/rad, too far from stop_stiffness.{kind} {stop:g}",
+                    f"springs within a factor of {_STEEPEST:g} of the stop",
+                )
+        return None
 
 
 Speed = Annotated[float, Quantity("m/s", 0.0, 5.0, above="is it in km/h or cm/s?")]

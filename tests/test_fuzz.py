@@ -6,6 +6,7 @@ The suite tries a few examples, always the same; `pytest tests/test_fuzz.py
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import random
@@ -19,14 +20,14 @@ from typing import Any, Final
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from broken import angles, arrays
 from helpers import stylised_series
 from made_c3d import write_c3d
 from pathwalker_cli.config import load_config
-from pathwalker_cli.errors import InputError
+from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.inverse.markers import load_marker_set
 from pathwalker_cli.io import c3d
 from pathwalker_cli.io.c3d_checks import checked_recording
@@ -195,6 +196,13 @@ def test_any_value_for_any_key(name: str, data: st.DataObject) -> None:
     tried(read, file, yaml.safe_dump(mapping, allow_unicode=True).encode("utf-8", "replace"))
 
 
+@pytest.mark.parametrize("problem", ["[]", "{}", "{[]: 1}", "null", "[mapd-orthosis]"])
+def test_a_problem_that_is_no_text(problem: str) -> None:
+    """A config asks what problem it is for before anything is validated."""
+    read, file, _ = READERS["config"]
+    tried(read, file, f"problem: {problem}\n".encode())
+
+
 @pytest.mark.parametrize("name", ["motion", "multipliers"])
 @given(data=st.data())
 def test_any_array_for_any_array(name: str, data: st.DataObject) -> None:
@@ -209,6 +217,16 @@ def test_any_array_for_any_array(name: str, data: st.DataObject) -> None:
     tried(read, file, arrays(**found))
 
 
+@pytest.mark.parametrize("key", ["durations", "parameters", "right_toe.states"])
+def test_complex_numbers_are_no_motion(key: str) -> None:
+    with np.load(io.BytesIO(motion())) as archive:
+        found = {name: archive[name] for name in archive.files}
+    found[key] = found[key] * (1.0 + 1.0j)
+    (folder() / "made.npz").write_bytes(arrays(**found))
+    with pytest.raises(DataError, match=r"no numbers|not finite"):
+        read_motion(folder() / "made.npz")
+
+
 @cache
 def walk() -> bytes:
     """Return a C3D file that is in order."""
@@ -216,6 +234,7 @@ def walk() -> bytes:
 
 
 @given(seed=st.integers(0, 2**63))
+@example(seed=179_076_567_587_048)  # more labels than points
 def test_c3d_files_with_some_bytes_changed(seed: int) -> None:
     """Every example takes a process, and some kill it."""
     rng = random.Random(seed)

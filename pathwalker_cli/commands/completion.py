@@ -18,7 +18,7 @@ def completion_command(context: click.Context, shell: str) -> None:
     from click.shell_completion import ShellComplete, get_completion_class
 
     kind = get_completion_class(shell)
-    assert kind is not None
+    assert kind is not None  # noqa: S101 - click knows every shell of the choice
     program = context.find_root().command
     complete = kind(program, {}, "pathwalker", "_PATHWALKER_COMPLETE")
     # Bash's own `source` asks a bash for its version; the script is the same without one.

@@ -245,9 +245,10 @@ class StudyConfig(YamlModel):
     @classmethod
     def _defaults(cls, value: Any) -> Any:
         """Let the defaults of the problem stand where the config is silent."""
-        if not isinstance(value, dict) or value.get("problem") not in PROBLEMS:
+        problem = value.get("problem") if isinstance(value, dict) else None
+        if not isinstance(problem, str) or problem not in PROBLEMS:
             return value
-        defaults = PROBLEMS[str(value["problem"])].defaults
+        defaults = PROBLEMS[problem].defaults
         return merged(defaults, value)
 
     @field_validator("problem")

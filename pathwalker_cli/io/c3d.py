@@ -149,8 +149,9 @@ def read_c3d(path: str | Path) -> Recording:
     parameters = content["parameters"]
     rate = float(_value(parameters, "POINT", "RATE", path)[0])
     first_frame = int(content["header"]["points"]["first_frame"]) + 1
-    labels = _value(parameters, "POINT", "LABELS", path)
     points = content["data"]["points"]
+    # labels beyond the last point name nothing
+    labels = _value(parameters, "POINT", "LABELS", path)[: points.shape[1]]
     samples = content["data"]["analogs"].shape[2]
     return Recording(
         name=path.stem,
@@ -190,7 +191,7 @@ def _probe(path: Path) -> None:
     words = [sys.executable, "-P", "-c", _PROBE, str(path.resolve())]
     what = ""
     try:
-        done = subprocess.run(
+        done = subprocess.run(  # noqa: S603 - this Python, a text of this module, and a path
             words, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=_LONGEST
         )
         if done.returncode == _TOO_LARGE:

@@ -63,7 +63,7 @@ def entries(path: Path) -> tuple[Entry, ...]:
     """Return every key of a YAML file in order, values as they are written there."""
     text = path.read_text(encoding="utf-8")
     node = yaml.compose(text, yaml.SafeLoader)
-    assert isinstance(node, yaml.MappingNode), path
+    assert isinstance(node, yaml.MappingNode), path  # noqa: S101 - configs are mappings
     return tuple(_entries(node, text, reasons(path), ()))
 
 

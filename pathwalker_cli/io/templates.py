@@ -17,7 +17,7 @@ def templates(package: str, folder: str = "templates", *, escape: bool = True) -
     """
     return Environment(
         loader=PackageLoader(package, folder),
-        autoescape=escape,
+        autoescape=escape,  # noqa: S701 - True for HTML, False for plain text and YAML only
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

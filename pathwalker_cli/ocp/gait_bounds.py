@@ -50,7 +50,7 @@ def gait_bounds(walker: Walker, config: BoundsConfig) -> GaitBounds:
         config: Bounds of the study.
 
     Raises:
-        ConfigError: If a stiffness range leaves nothing.
+        ConfigError: If a joint has no range, or stops and springs of a range do not fit.
     """
     sources: dict[str, str] = {}
     entries: dict[tuple[str, ...], Range] = _always()
@@ -175,12 +175,17 @@ def _stiffness(
 ) -> dict[tuple[str, ...], Range]:
     if walker.orthosis is None:
         return {}
-    real = walker.patient.require_orthosis().stiffness_range
+    orthosis = walker.patient.require_orthosis()
+    real = orthosis.stiffness_range
     entries: dict[tuple[str, ...], Range] = {}
     for name in STIFFNESSES:
         kind = name.split("_")[0]
         given = config.stiffness.get(name) or getattr(config, f"{kind}_stiffness")
         pair = given or getattr(real, kind)
+        fault = orthosis.spring_fault(kind, *pair)
+        if fault is not None:
+            key = f"stiffness.{name}" if name in config.stiffness else f"{kind}_stiffness"
+            raise ConfigError(f"is {fault[0]}", where=f"bounds.{key}", allowed=fault[1])
         entries[(name,)] = pair
         reason = "from the config" if given else f"real springs: {real.source}"
         sources[name] = f"[{pair[0]:g}, {pair[1]:g}] N m/rad, {reason}"

@@ -207,7 +207,7 @@ class GaitSolver:
 
     def _named(self, name: str) -> Callable[[ProgressReport], None]:
         observer = self.observer
-        assert observer is not None
+        assert observer is not None  # noqa: S101 - asked for only where there is one
         return lambda report: observer(name, report)
 
     def settings(self, tolerance: float, barrier: float, warm: bool = False) -> IpoptSettings:

@@ -106,7 +106,8 @@ class StageFactors:
         known = self._library.stage_ldl_analyse(
             self._solver, lower.shape[0], lower.nnz, rows, columns
         )
-        assert known, "the order does not fit the matrix"
+        if not known:
+            raise ValueError("the order does not fit the matrix")
         values = np.ascontiguousarray(lower.data, float)
         return bool(self._library.stage_ldl_factorise(self._solver, values, _THRESHOLD))
 

@@ -62,7 +62,7 @@ def read_motion(path: str | Path) -> PhasedMotion:
         names = tuple(str(name) for name in arrays["phases"])
         if names != PHASE_NAMES:
             raise DataError("holds other phases", where=str(path), allowed=", ".join(PHASE_NAMES))
-        durations = np.asarray(arrays["durations"], float)
+        durations, parameters = (_floats(arrays[key]) for key in ("durations", "parameters"))
         positive = np.isfinite(durations) & (durations > 0.0)
         if durations.shape != (len(names),) or not positive.all():
             raise DataError("holds phase durations that are not positive", where=str(path))
@@ -70,7 +70,7 @@ def read_motion(path: str | Path) -> PhasedMotion:
             PhaseMotion(name, float(duration), **{k: arrays[f"{name}.{k}"] for k in _ARRAYS})
             for name, duration in zip(names, durations, strict=True)
         )
-        motion = PhasedMotion(phases, np.asarray(arrays["parameters"], float))
+        motion = PhasedMotion(phases, parameters)
     except KeyError as missing:
         raise DataError(f"lacks {missing}", where=str(path), mend=_AGAIN) from None
     except (TypeError, ValueError) as problem:
@@ -101,6 +101,17 @@ def read_arrays(path: Path) -> Mapping[str, np.ndarray]:
     if not all(isinstance(array, np.ndarray) for array in arrays.values()):
         raise DataError("holds something else than arrays", where=str(path), mend=_AGAIN)
     return arrays
+
+
+def _floats(values: np.ndarray) -> np.ndarray:
+    """Return an array of floating point numbers.
+
+    Raises:
+        TypeError: If it holds something else.
+    """
+    if values.dtype.kind != "f":
+        raise TypeError(f"an array of type {values.dtype}")
+    return values
 
 
 def _unpacked_size(path: Path) -> int:

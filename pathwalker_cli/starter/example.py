@@ -199,7 +199,7 @@ def _load(
     as far before the toe marker as it did: toes are longer than the marker tells.
     """
     trial, side = played.trial, stance.side
-    assert trial.forces is not None
+    assert trial.forces is not None  # noqa: S101 - shipped recordings have forces
     rows = slice(stance.strike, stance.toe_off + 1)
     known = np.arange(stance.strike, stance.toe_off + 1)
     heel, toe = _foot(other.model, trial.motion.values[rows], side).T

@@ -122,7 +122,7 @@ def _looked_beyond(
 
 def _between(search: _Search, share: float) -> float:
     """Return where the cost should meet the share, between the points inside and outside."""
-    assert search.outside is not None
+    assert search.outside is not None  # noqa: S101 - called once a point outside is known
     part = (share - search.rise) / (search.outside_rise - search.rise)
     # the cost is convex near its optimum: the true edge lies beyond the secant's
     part = min(max(part**0.5 if search.rise <= 0.0 else part, 0.1), 0.9)

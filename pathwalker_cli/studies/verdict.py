@@ -354,7 +354,7 @@ def _nearest(springs: Sequence[RealSpring], stiffness: float) -> list[RealSpring
 
 def _stops(series: GaitSeries) -> Iterator[StopVerdict]:
     """Yield how far the ankles go into every hard stop."""
-    assert series.walker.orthosis is not None
+    assert series.walker.orthosis is not None  # noqa: S101 - verdicts are for orthoses
     weights = series.quadrature
     rows = dict(zip(SIDES, ANKLES, strict=True))
     for side, fixed in zip(SIDES, series.walker.orthosis, strict=True):

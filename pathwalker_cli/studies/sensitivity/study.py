@@ -117,7 +117,7 @@ def _sensitivity(around: Neighbourhood, place: str, base: Mapping[str, float]) -
     """Return the answer to one number."""
     value = _value(around.optimum, place)
     if place in STIFFNESSES:
-        assert value is not None
+        assert value is not None  # noqa: S101 - a spring has a value
         found, unit = around.by_spring(place), value
     else:
         found, unit = around.by_factor(place), 1.0

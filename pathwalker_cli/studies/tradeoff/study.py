@@ -168,7 +168,7 @@ class _Refined:
 
     def point(self, checked: _Checked) -> FrontPoint:
         """Return a point with the numbers of a refined mesh, if that converges."""
-        assert checked.optimum is not None
+        assert checked.optimum is not None  # noqa: S101 - called for points with an optimum
         folder, config = self._folder / f"w{checked.weight:g}", checked.optimum.config
         if not is_done(folder, config):
             solution = GaitSolver(config, self._log).solve(checked.optimum.motion)
