@@ -150,6 +150,7 @@ ORIGIN: Final = {
     "start": "where the search began",
     "warm_start": "folder of the earlier run, or `null`",
     "dynamics_backend": "`pinocchio.casadi`, `compiled` or `direct`",
+    "kernels": "vectors that the compiled kernels used: `x86-64-v4`, `x86-64-v3`, `generic`, or `none` compiled",
     "published_model": "whether the published model's misplaced right forearm was kept",
     "date": "day on which the run was made",
     "versions": "PathWalker, Python and numerical libraries",

@@ -20,13 +20,13 @@ from click.testing import CliRunner, Result
 from conftest import MadeSolution
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
+from pathwalker_cli.config.values import changed_values, differing_values
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.inverse.study import load_inverse_dynamics
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report import figures
 from pathwalker_cli.report.build import page_of
-from pathwalker_cli.report.config_values import changed_values, differing_values
 from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
 from pathwalker_cli.report.gait_page import gait_page
 from pathwalker_cli.report.html import page_html
@@ -305,7 +305,7 @@ def test_values_that_are_no_defaults_are_those_of_the_problem(made_solution: Mad
     config = made_solution("mapd-barefoot").config
     assert changed_values(config) == {}
     other = config.model_copy(update={"starts": 3})
-    assert changed_values(other) == {"starts": "3"}
+    assert changed_values(other) == {"starts": (3, 1)}
     assert differing_values([config, other]) == {"starts": ("1", "3")}
     assert differing_values([config, config]) == {}
 

@@ -111,8 +111,8 @@ def test_metrics_are_strict_json_with_the_keys_that_scripts_rely_on(run: Path) -
         "phase_durations", "min_vertical_force", "largest_violation", "largest_violation_name",
         "reintegration_position_error", "reintegration_velocity_error", "second_engine_residual",
         "active_bounds", "intervals", "iterations", "seconds_build", "seconds_solve",
-        "seconds_verify", "dynamics_backend", "stages", "patient", "condition", "start", "smoke",
-        "versions", "input_hashes", "bound_sources", "notes",
+        "seconds_verify", "dynamics_backend", "kernels", "stages", "patient", "condition", "start",
+        "smoke", "versions", "input_hashes", "bound_sources", "notes",
     }  # fmt: skip
     assert metrics["status"] == "converged"
     assert metrics["reintegration_position_error"] == 5e-4

@@ -11,6 +11,7 @@ from pathwalker_cli.checking.plausible import odd_patient
 from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.checking.sense import contradictions, oddities
 from pathwalker_cli.config import StudyConfig, load_config, study_patient
+from pathwalker_cli.config.values import changed_values
 from pathwalker_cli.conventions import CONDITIONS, STIFFNESSES
 from pathwalker_cli.errors import DataError, PatientError, placed
 from pathwalker_cli.io.recordings import recording_names
@@ -112,7 +113,10 @@ def described(solver: GaitSolver, path: str) -> Checked:
     shooting = config.transcription == "multiple-shooting"
     folder = default_folder(config, patient.id)
     recordings = {c: recording_names(patient, c) for c in CONDITIONS}
-    changed = _changed(config)
+    changed = {
+        key: f"{_short(now)} (default {_short(usual)})"
+        for key, (now, usual) in changed_values(config).items()
+    }
     bounds = _bounds(solver)
     table: list[Row] = [
         ("problem", f"{config.problem}, {walker.condition}"),
@@ -274,28 +278,6 @@ def _bounds(solver: GaitSolver) -> dict[str, str]:
     found["vertical force"] = f"at least {config.least_vertical_force:g} N per point, config"
     found["height of points in the air"] = f"at least {config.least_height:g} m, config"
     found["activations, excitations"] = "[0, 1], always"
-    return found
-
-
-def _changed(config: StudyConfig) -> dict[str, str]:
-    """Return the settings that differ from the defaults of the problem."""
-    plain = StudyConfig(problem=config.problem, patient=config.patient)
-    now, usual = _flat(config.model_dump(mode="json")), _flat(plain.model_dump(mode="json"))
-    return {
-        key: f"{_short(value)} (default {_short(usual[key])})"
-        for key, value in now.items()
-        if usual.get(key) != value
-    }
-
-
-def _flat(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings of all blocks by dotted key."""
-    found: dict[str, Any] = {}
-    for block, value in content.items():
-        if isinstance(value, Mapping) and block in StudyConfig.model_fields:
-            found |= {f"{block}.{key}": entry for key, entry in value.items()}
-        else:
-            found[block] = value
     return found
 
 

@@ -26,6 +26,7 @@ class RunMetrics(BaseModel):
     patient: str | None = None
     date: str | None = None
     start: str | None = None
+    kernels: str | None = None
     warm_start: str | None = None
     walking_speed: Number = None
     second_engine_residual: Number = None

@@ -17,6 +17,7 @@ from pathwalker_cli.io.json_file import json_text
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.ocp.balance import balance
 from pathwalker_cli.ocp.goal_costs import goal_values
+from pathwalker_cli.ocp.kernels import kernels_level
 from pathwalker_cli.ocp.solution import GaitSolution
 from pathwalker_cli.output.metrics import gait_metrics
 from pathwalker_cli.output.versions import today, versions
@@ -176,6 +177,7 @@ def _origin(solution: GaitSolution, config: StudyConfig, inputs: RunInputs) -> d
         "published_model": config.model.published,
         "date": today(),
         "versions": versions(),
+        "kernels": kernels_level() or "none",
         "input_hashes": inputs.hashes,
     }
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.config.values import changed_values, value_text
 from pathwalker_cli.conventions import LEG_JOINTS, SUFFIX
 from pathwalker_cli.ocp.verify import ActiveBound
 from pathwalker_cli.output.solve_text import bound_line, interesting, source_lines
-from pathwalker_cli.report.config_values import changed_values
 from pathwalker_cli.report.content import Section, fact_table
 from pathwalker_cli.report.runs import ReportRun
 
@@ -112,7 +112,11 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
     hashes = metrics.get("input_hashes") or {}
     yield "Inputs", ", ".join(f"{name} {str(h)[:_HASH]}" for name, h in hashes.items())
     changed = changed_values(config)
-    yield "Config", "; ".join(f"{k} = {v}" for k, v in changed.items()) or "all defaults"
+    yield (
+        "Config",
+        "; ".join(f"{key} = {value_text(now)}" for key, (now, _) in changed.items())
+        or "all defaults",
+    )
 
 
 def _bounds(metrics: Mapping[str, Any]) -> Iterator[str]:

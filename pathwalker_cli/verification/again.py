@@ -16,7 +16,9 @@ def difference_lines(before: Run, after: Run) -> Iterator[str]:
     """Yield in words how a run that was solved again differs from the one before."""
     if before.metrics.get("warm_start"):
         yield f"the run before began with {before.metrics['warm_start']}; this one did not"
-    versions = before.metrics["versions"], after.metrics["versions"]
+    versions = [
+        run.metrics["versions"] | {"kernels": run.metrics.get("kernels")} for run in (before, after)
+    ]
     for name in _different(*versions):
         yield f"{name}: {versions[0].get(name)} before, {versions[1].get(name)} now"
     if before.metrics["motion_hash"] == after.metrics["motion_hash"]:
