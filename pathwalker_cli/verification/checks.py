@@ -34,8 +34,9 @@ _SAME: Final = 1e-6
 """Relative difference up to which two numbers of a file count as the same."""
 _EQUATIONS: Final = 1e-6
 """Largest residual of the equations of motion [N, N m]."""
-_ENERGY, _MOMENTUM = 1e-3, 1e-5
-"""Largest share of work and of impulse that a balance may miss."""
+_ENERGY, _MOMENTUM = 5e-3, 5e-5
+"""Largest share of work and of impulse that a balance may miss: some three times what meshes of the
+shipped tolerances miss on 95 different children, 1.8e-3 and 1.1e-5 (docs/hard-cases.md)."""
 _SLACK: Final = 10.0
 """How much more than the solver's tolerance the conditions may be off when evaluated anew."""
 _SHOOTING: Final = "solved by multiple shooting: its run folder holds a description only"
