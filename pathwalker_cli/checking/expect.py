@@ -27,11 +27,11 @@ class Measured:
 
 
 MEASURED: Final[dict[str, tuple[Measured, Measured]]] = {
-    "mapd-barefoot": (Measured(183, 12.5), Measured(222, 12.4)),
-    "mapd-healthy": (Measured(145, 10.5), Measured(162, 9.3)),
-    "mapd-orthosis": (Measured(271, 17.7), Measured(388, 22.2)),
-    "mapd-ws-orthosis": (Measured(319, 20.3), Measured(585, 38.3)),
-    "ls-barefoot": (Measured(69, 7.8), Measured(127, 10.0)),
+    "mapd-barefoot": (Measured(183, 13.1), Measured(222, 12.3)),
+    "mapd-healthy": (Measured(145, 10.4), Measured(162, 8.8)),
+    "mapd-orthosis": (Measured(311, 19.1), Measured(405, 23.3)),
+    "mapd-ws-orthosis": (Measured(324, 20.1), Measured(596, 38.7)),
+    "ls-barefoot": (Measured(69, 7.4), Measured(127, 9.8)),
 }
 """By problem: on 64 intervals without refinement, and refined from 48 intervals on."""
 
