@@ -160,7 +160,7 @@ def test_a_page_is_self_contained_and_valid(runs: Path, tmp_path: Path) -> None:
         "24.7 kg",
         "1.25 m",
         "not a medical device",
-        "roughly determined",
+        "set by its limit",
         "at the limit of what can be bought",
     ):
         assert words in page.text.replace("\N{NO-BREAK SPACE}", " "), words
@@ -229,9 +229,7 @@ def test_springs_are_real_ones_in_both_units_with_range_and_verdict(runs: Path) 
     assert "K_D left: it sits at the upper limit" in facts["Limits and doubts"]
     assert recommended(run)["plantarflexion_stiffness_left"] == 5.0
     answer = gait_page([run]).answer
-    assert answer.startswith(
-        "Springs to take: K_D 91.7 N m/rad (roughly determined) right and left"
-    )
+    assert answer.startswith("Springs to take: K_D 91.7 N m/rad (set by its limit) right and left")
 
 
 def test_without_a_verdict_the_page_says_so(made_solution: MadeSolution, tmp_path: Path) -> None:

@@ -16,13 +16,14 @@ from pathwalker_cli.io.yaml_file import validate
 from pathwalker_cli.ocp.solution import LocalOptimum
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.patient_blocks import SpringSet
+from pathwalker_cli.patient_blocks import RealSpring, SpringSet
 from pathwalker_cli.studies.verdict import (
     SHARE,
     SnappedSprings,
     SpringVerdict,
     StopVerdict,
     Verdict,
+    _nearest,
     _quadratic_edge,
     _stops,
     verdict_of,
@@ -62,6 +63,21 @@ def text(made: Verdict) -> dict[str, str]:
 )  # fmt: skip
 def test_the_width_of_the_region_decides_the_words(region: tuple[float, float], words: str) -> None:
     assert replace(INSIDE, region=region).determined == words
+
+
+def test_real_springs_are_taken_from_the_range_where_it_holds_any() -> None:
+    springs = [RealSpring(name=f"{k:g}", stiffness=k) for k in (5.0, 40.0, 92.0)]
+    assert [spring.name for spring in _nearest(springs, 20.0, (20.0, 150.0))] == ["40", "92"]
+    assert _nearest(springs, 120.0, (100.0, 150.0))[0].name == "92"
+
+
+@pytest.mark.parametrize(
+    ("region", "words"), [((60.0, 92.0), "set by its limit"), ((5.0, 92.0), "not determined")]
+)
+def test_a_spring_at_its_limit_is_not_called_determined(
+    region: tuple[float, float], words: str
+) -> None:
+    assert replace(INSIDE, region=region, limit="upper").determined == words
 
 
 def test_stiffness_is_told_per_radian_and_per_degree() -> None:

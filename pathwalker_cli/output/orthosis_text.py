@@ -14,8 +14,10 @@ _KINDS: Final = {"dorsiflexion": "K_D", "plantarflexion": "K_P"}
 
 def angle_words(angle: float) -> str:
     """Return an ankle angle [rad, + plantarflexion] in degrees with its direction."""
-    degrees = float(to_degrees(abs(angle)))
-    return f"{degrees:.1f} deg {'plantarflexion' if angle > 0.0 else 'dorsiflexion'}"
+    degrees = f"{float(to_degrees(abs(angle))):.1f}"
+    if degrees == "0.0":
+        return "0 deg"
+    return f"{degrees} deg {'plantarflexion' if angle > 0.0 else 'dorsiflexion'}"
 
 
 def orthosis_rows(orthosis: OrthosisData) -> list[tuple[str, str]]:

@@ -94,11 +94,11 @@ class SpringVerdict:
         """How well least effort determines the spring, in words."""
         if self.prescribed:
             return "prescribed"
-        if any(self.again):
+        if any(self.again) or self.width > _ROUGHLY:
             return "not determined"
-        if self.width <= _DETERMINED:
-            return "determined"
-        return "roughly determined" if self.width <= _ROUGHLY else "not determined"
+        if self.limit:
+            return "set by its limit"
+        return "determined" if self.width <= _DETERMINED else "roughly determined"
 
 
 @dataclass(frozen=True)
@@ -314,8 +314,9 @@ class _Judge:
             return None
         names = self.around.springs
         stiffness = np.array([self.optimum.stiffness[STIFFNESSES.index(n)] for n in names])
+        ranges = spring_ranges(self.optimum)
         lists = [
-            _nearest(getattr(real, name.split("_")[0]), value)
+            _nearest(getattr(real, name.split("_")[0]), value, ranges[name])
             for name, value in zip(names, stiffness, strict=True)
         ]
         best = min(itertools.product(*lists), key=lambda choice: self._estimate(choice, stiffness))
@@ -347,9 +348,13 @@ def _quadratic_edge(slope: float, curvature: float) -> float:
     return float((np.sqrt(slope**2 + 2.0 * curvature * SHARE) - slope) / curvature)
 
 
-def _nearest(springs: Sequence[RealSpring], stiffness: float) -> list[RealSpring]:
-    """Return the real springs next to a stiffness."""
-    return sorted(springs, key=lambda spring: abs(spring.stiffness - stiffness))[:_CANDIDATES]
+def _nearest(
+    springs: Sequence[RealSpring], stiffness: float, allowed: tuple[float, float]
+) -> list[RealSpring]:
+    """Return the real springs next to a stiffness, if possible those that are allowed."""
+    within = [spring for spring in springs if allowed[0] <= spring.stiffness <= allowed[1]]
+    by_distance = sorted(within or springs, key=lambda spring: abs(spring.stiffness - stiffness))
+    return by_distance[:_CANDIDATES]
 
 
 def _stops(series: GaitSeries) -> Iterator[StopVerdict]:
