@@ -221,5 +221,8 @@ def test_real_springs_that_cost_less_than_the_optimum_are_a_warning() -> None:
     snapped = SnappedSprings({name: "flexible"}, {name: 40.1}, -0.026, 0.64, "converged")
     line = text(verdict(snapped=snapped))["real springs"]
     assert "WARNING: that is less than the optimum found" in line
-    near = replace(snapped, rise=-1e-4)
-    assert "WARNING" not in text(verdict(snapped=near))["real springs"]
+    for near in (-1e-4, 0.04):
+        line = text(verdict(snapped=replace(snapped, rise=near)))["real springs"]
+        assert "WARNING" not in line
+    far = replace(snapped, rise=0.94)
+    assert "WARNING: 94 % above the springs found" in text(verdict(snapped=far))["real springs"]

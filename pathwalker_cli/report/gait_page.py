@@ -16,6 +16,7 @@ from pathwalker_cli.report.runs import ReportRun, changes_of
 from pathwalker_cli.report.springs import prescribed, recommended, spring_section
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.studies.verdict_text import snapped_warning
 
 __all__ = ["gait_page"]
 
@@ -106,6 +107,8 @@ def _warnings(runs: Sequence[ReportRun]) -> list[str]:
             found.append(
                 f"{run.label}: a quick check on a coarse mesh: numbers for orientation only"
             )
+        if run.verdict is not None and (warning := snapped_warning(run.verdict)):
+            found.append(f"{run.label}, springs to take: {warning}")
         if _coarse(run):
             found.append(
                 f"{run.label}: an independent integrator misses the mesh by more than the config "

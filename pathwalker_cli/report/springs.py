@@ -11,9 +11,9 @@ from pathwalker_cli.studies.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, Verdict
 from pathwalker_cli.studies.verdict_text import (
     PRESCRIBED,
-    beaten_text,
     per_degree,
     reservations,
+    snapped_warning,
     stop_text,
 )
 
@@ -111,7 +111,7 @@ def _facts(verdict: Verdict) -> list[Fact]:
             f"solved again with these: cost {100 * snapped.rise:+.2g} %, "
             f"{snapped.walking_speed:.3f} m/s"
         )
-        real = ". ".join(filter(None, (real, beaten_text(verdict))))
+        real = ". ".join(filter(None, (real, snapped_warning(verdict))))
     else:
         real = f"estimated cost {100 * snapped.rise:+.2g} % (solving it: {snapped.status})"
     if verdict.starts > 1:

@@ -11,7 +11,14 @@ from pathwalker_cli.conventions import STIFFNESSES, to_degrees
 from pathwalker_cli.studies.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, StopVerdict, Verdict
 
-__all__ = ["PRESCRIBED", "beaten_text", "per_degree", "reservations", "stop_text", "verdict_lines"]
+__all__ = [
+    "PRESCRIBED",
+    "per_degree",
+    "reservations",
+    "snapped_warning",
+    "stop_text",
+    "verdict_lines",
+]
 
 _BEATEN: Final = 1e-3
 """Share of the cost by which real springs must be cheaper than the optimum to say so."""
@@ -100,15 +107,25 @@ def _optima(verdict: Verdict) -> str:
     return f"{text}, with {', '.join(spread)} N m/rad"
 
 
-def beaten_text(verdict: Verdict) -> str:
-    """Return a warning where the real springs cost less than the optimum; "" where they do not."""
+def snapped_warning(verdict: Verdict) -> str:
+    """Return what to beware of with the real springs; "" where there is nothing.
+
+    They may cost less than the optimum, which is then not the best one, or far more.
+    """
     snapped = verdict.snapped
-    if snapped is None or snapped.status != "converged" or snapped.rise > -_BEATEN:
+    if snapped is None:
         return ""
-    return (
-        "WARNING: that is less than the optimum found, which is therefore not the best one; "
-        "`starts: 8` looks for better ones"
-    )
+    if snapped.status == "converged" and snapped.rise <= -_BEATEN:
+        return (
+            "WARNING: that is less than the optimum found, which is therefore not the best one; "
+            "`starts: 8` looks for better ones"
+        )
+    if snapped.rise > SHARE:
+        return (
+            f"WARNING: {100 * snapped.rise:.2g} % above the springs found, to which all figures "
+            "belong; none that is listed and allowed comes near: prescribe these and solve again"
+        )
+    return ""
 
 
 def _snapped(verdict: Verdict) -> str:
@@ -120,7 +137,8 @@ def _snapped(verdict: Verdict) -> str:
         f"{per_degree(stiffness):.2f} N m/deg)"
         for name, stiffness in snapped.stiffness.items()
     )
-    if snapped.status == "converged":
-        text = f"{chosen}: cost {100 * snapped.rise:+.2g} %, {snapped.walking_speed:.3f} m/s"
-        return "; ".join(filter(None, (text, beaten_text(verdict))))
-    return f"{chosen}: estimated cost {100 * snapped.rise:+.2g} % (solving it: {snapped.status})"
+    text = f"{chosen}: cost {100 * snapped.rise:+.2g} %, {snapped.walking_speed:.3f} m/s"
+    if snapped.status != "converged":
+        rise = f"{100 * snapped.rise:+.2g} %"
+        text = f"{chosen}: estimated cost {rise} (solving it: {snapped.status})"
+    return "; ".join(filter(None, (text, snapped_warning(verdict))))
