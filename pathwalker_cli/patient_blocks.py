@@ -220,7 +220,8 @@ class OrthosisData(YamlModel):
                 raise invalid(
                     f"has neutral_angle {self.neutral_angle:g} rad with free_play "
                     f"{self.free_play:g} rad, not between the {side} stops",
-                    allowed=f"between {low:g} and {high:g} rad, {clearance:g} rad from either",
+                    allowed=f"between {low:g} and {high:g} rad, {_STOP_CLEARANCE:g} times the "
+                    "free play from either",
                 )
         return self
 

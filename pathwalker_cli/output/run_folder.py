@@ -329,7 +329,8 @@ def _file(folder: Path, name: str) -> Path:
     """Return a file of a run that must be there."""
     path = folder / name
     if not folder.is_dir():
-        raise DataError("no such folder", where=str(folder), allowed="the folder of a run")
+        what = "is a file" if folder.exists() else "no such folder"
+        raise DataError(what, where=str(folder), allowed="the folder of a run")
     if not path.is_file():
         raise DataError(f"is no run folder: {name} is missing", where=str(folder),
                         allowed="a folder that `pathwalker solve` wrote")  # fmt: skip

@@ -88,7 +88,8 @@ def folder_kind(folder: Path) -> Kind:
         DataError: If it is nothing that a report can be made of.
     """
     if not folder.is_dir():
-        raise DataError("no such folder", where=str(folder), allowed=_ALLOWED)
+        what = "is a file" if folder.exists() else "no such folder"
+        raise DataError(what, where=str(folder), allowed=_ALLOWED)
     found = _kind(folder)
     if found is None:
         raise DataError("holds nothing to report", where=str(folder), allowed=_ALLOWED)
