@@ -16,6 +16,7 @@ from pathwalker_cli.conventions import (
     SIDES,
     STIFFNESSES,
     mirror_permutation,
+    mirrored,
 )
 from pathwalker_cli.goals import Goals
 from pathwalker_cli.model.contact import PHASES
@@ -153,7 +154,10 @@ def _swapped(content: Any) -> Any:
         return content
     if set(content) == set(SIDES):
         return {"right": content["left"], "left": content["right"]}
-    return {key: _swapped(value) for key, value in content.items()}
+    return {
+        mirrored(key) if key in COORDINATES else key: _swapped(value)
+        for key, value in content.items()
+    }
 
 
 def similar(patient: Patient, length: float, mass: float) -> Patient:
