@@ -22,7 +22,7 @@ from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.output.orthosis_text import orthosis_rows
 from pathwalker_cli.output.run_folder import ENTRIES, check_target, default_folder
-from pathwalker_cli.output.solve_text import patient_notes
+from pathwalker_cli.output.solve_text import notes_together
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient_blocks import Strengths
 from pathwalker_cli.studies.batch.checks import check_patient
@@ -173,7 +173,7 @@ def walker_rows(walker: Walker) -> list[Row]:
 
 def patient_remarks(patient: Patient) -> tuple[str, ...]:
     """Return what is unusual about a patient, then what was filled in."""
-    return (*odd_patient(patient), *patient_notes(patient))
+    return (*odd_patient(patient), *notes_together(patient.notes))
 
 
 def orthosis_content(patient: Patient) -> dict[str, Any] | None:

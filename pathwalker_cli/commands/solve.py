@@ -133,8 +133,8 @@ def _report(outcome: Outcome, folder: Path) -> None:
     from pathwalker_cli.output.run_metrics import stiffness_ranges
     from pathwalker_cli.output.solve_text import (
         detail_lines,
+        notes_together,
         optimum_lines,
-        patient_notes,
         source_lines,
     )
     from pathwalker_cli.output.text import active_bounds, summary, summary_renderable
@@ -156,7 +156,7 @@ def _report(outcome: Outcome, folder: Path) -> None:
         click.echo()
     rows = [*optimum_lines(solution.optima), *detail_lines(solution, metrics)]
     rows += [("bounds", line) for line in source_lines(solution.bounds.sources)]
-    rows += [("patient", note) for note in patient_notes(solution.walker.patient)]
+    rows += [("patient", note) for note in notes_together(solution.walker.patient.notes)]
     _echo_rows(console, rows)
     click.echo(f"\nWritten to {folder}")
 

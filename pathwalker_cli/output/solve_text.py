@@ -11,7 +11,6 @@ from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES, SUFFIX, 
 from pathwalker_cli.ocp.shortfall import Shortfall
 from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.ocp.verify import ActiveBound
-from pathwalker_cli.patient import Patient
 
 __all__ = [
     "bound_line",
@@ -19,8 +18,8 @@ __all__ = [
     "detail_lines",
     "failure_text",
     "interesting",
+    "notes_together",
     "optimum_lines",
-    "patient_notes",
     "shortfall_text",
     "source_lines",
 ]
@@ -211,11 +210,15 @@ def _in_words(generator: str) -> str:
     return f"{side} {stem}".replace("_", " ") if side else generator.replace("_", " ")
 
 
-def patient_notes(patient: Patient) -> tuple[str, ...]:
-    """Return what was filled in for a patient, lengths from body proportions in one sentence."""
+def notes_together(notes: Sequence[str]) -> tuple[str, ...]:
+    """Return what was filled in for a patient, lengths from body proportions in one sentence.
+
+    Args:
+        notes: Notes of the patient, one per number that was filled in.
+    """
     begin = "segment length "
-    lengths = [note for note in patient.notes if note.startswith(begin)]
+    lengths = [note for note in notes if note.startswith(begin)]
     names = ", ".join(note.removeprefix(begin).partition(":")[0] for note in lengths)
     reason = lengths[0].partition(", ")[2] if lengths else ""
     together = (f"segment lengths {names}: {reason}",) if lengths else ()
-    return (*together, *(note for note in patient.notes if note not in lengths))
+    return (*together, *(note for note in notes if note not in lengths))

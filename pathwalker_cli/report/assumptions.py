@@ -10,7 +10,7 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.config.values import changed_values, value_text
 from pathwalker_cli.conventions import LEG_JOINTS, SUFFIX
 from pathwalker_cli.ocp.verify import ActiveBound
-from pathwalker_cli.output.solve_text import bound_line, interesting, source_lines
+from pathwalker_cli.output.solve_text import bound_line, interesting, notes_together, source_lines
 from pathwalker_cli.report.content import Section, fact_table
 from pathwalker_cli.report.runs import ReportRun
 
@@ -69,7 +69,7 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
         ". ".join(
             [
                 f"body mass {run.patient.body_mass:g} kg and strengths from the patient's file",
-                *map(str, notes),
+                *notes_together([*map(str, notes)]),
             ]
         ),
     )
