@@ -16,14 +16,14 @@ import numpy as np
 from matplotlib import rc_context
 
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.ocp import mesh as meshing
+from pathwalker_cli.gait import mesh as meshing
+from pathwalker_cli.gait.cost_terms import walked_distance
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.cost_terms import walked_distance
-from pathwalker_cli.ocp.ipopt import NlpResult
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.ocp.verify import reintegrate
-from pathwalker_cli.output.figures.style import NEUTRAL, STYLE, new_figure
-from pathwalker_cli.output.run_folder import load_run
+from pathwalker_cli.results.run_folder import load_run
+from pathwalker_cli.stride.figures.style import NEUTRAL, STYLE, new_figure
+from pathwalker_cli.stride.verify import reintegrate
 
 DOCS: Final = Path(__file__).parents[1] / "docs"
 DEGREES: Final = (2, 3)

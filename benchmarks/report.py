@@ -79,7 +79,7 @@ class Report:
 
     Args:
         tables: Its tables.
-        reached: What it reached by key of a goal, see `goals.py`.
+        reached: What it reached by key of a goal, see `gait/goals.py`.
         peaks: Peak memory [MB] by what took it.
         failure: Why the section as a whole came to nothing; "" if it did not.
     """

@@ -20,11 +20,11 @@ import numpy as np
 from pathwalker_cli import build_walker, load_patient
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, SIDES, STIFFNESSES
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.output.figures import FIGURES
-from pathwalker_cli.output.metrics import GaitMetrics
-from pathwalker_cli.output.run_folder import ENTRIES
-from pathwalker_cli.output.tables import controls_table, forces_table, states_table, torques_table
+from pathwalker_cli.results.run_folder import ENTRIES
+from pathwalker_cli.results.tables import controls_table, forces_table, states_table, torques_table
+from pathwalker_cli.stride.figures import FIGURES
+from pathwalker_cli.stride.metrics import GaitMetrics
+from pathwalker_cli.stride.series import GaitSeries
 
 PAGE: Final = Path(__file__).with_name("run-folder.md")
 

@@ -18,11 +18,11 @@ from matplotlib.figure import Figure
 from figure_measure import complaints
 from helpers import stylised_series, walker_of
 from pathwalker_cli.config import load_config
-from pathwalker_cli.ocp.gait_bounds import gait_bounds
-from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult
-from pathwalker_cli.ocp.solution import GaitSolution, StageRecord
-from pathwalker_cli.ocp.verify import ActiveBound, Reintegration, Violation
+from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.solution import GaitSolution, StageRecord
+from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
 from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.stride.verify import ActiveBound, Reintegration, Violation
 
 _LENGTHS = {"short": 15, "long": 3000}
 """Examples of each property; the suite tries the same few ones every time."""

@@ -8,13 +8,13 @@ from functools import cache
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, Condition
+from pathwalker_cli.gait.problem import INTEGRALS
+from pathwalker_cli.gait.stylised import StylisedGait, stylised_trajectory
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 from pathwalker_cli.model.walker import Walker, build_walker
-from pathwalker_cli.ocp.gait import INTEGRALS
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times
-from pathwalker_cli.ocp.series import GaitSeries, gait_series
-from pathwalker_cli.ocp.stylised import StylisedGait, stylised_trajectory
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.trajectory import Trajectory
 
 ACTIVATION = 0.25

@@ -14,9 +14,9 @@ from conftest import made_result
 from helpers import stylised_series, walker_of
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.ocp.gait_bounds import gait_bounds
-from pathwalker_cli.ocp.ipopt import NlpResult
-from pathwalker_cli.output.run_folder import Run
+from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.results.run_folder import Run
 
 FREE = (91.9, 90.0, 6.0, 5.0)
 """Stiffnesses that least effort chooses where it may [N m/rad]."""

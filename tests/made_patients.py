@@ -18,18 +18,18 @@ from pathwalker_cli.conventions import (
     mirror_permutation,
     mirrored,
 )
-from pathwalker_cli.goals import Goals
+from pathwalker_cli.gait import mesh as meshing
+from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.goals import Goals
+from pathwalker_cli.gait.problem import INTEGRALS, VELOCITIES, GaitProblem, GaitWeights
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
-from pathwalker_cli.ocp.gait import INTEGRALS, VELOCITIES, GaitProblem, GaitWeights
-from pathwalker_cli.ocp.gait_bounds import gait_bounds
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.ocp.problem import ProblemNumbers
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient_blocks import SegmentLengths
+from pathwalker_cli.patient.blocks import SegmentLengths
 from pathwalker_cli.starter.child import Child, made_child
 
 MIDLINE: Final = ("pelvis", "hip_drop", "lumbar_height", "trunk", "head")

@@ -12,9 +12,9 @@ import numpy as np
 from conftest import made_result
 from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.ocp.gait_bounds import gait_bounds
-from pathwalker_cli.ocp.ipopt import NlpResult
+from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.patient import load_patient
 
 BEST = dict(zip(STIFFNESSES, (92.0, 40.0, 6.0, 5.0), strict=True))

@@ -21,8 +21,8 @@ from pathwalker_cli.conventions import CONTACT_FORCES, GENERATORS, Condition
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.model.walker import GENERATOR_ROWS, Walker, build_walker
-from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.stride.cycle import BOTH_SIDES
 
 PUBLISHED = Path(__file__).parents[2] / "shared" / "published"
 needs_published = pytest.mark.skipif(

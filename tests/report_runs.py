@@ -9,8 +9,8 @@ import pytest
 
 from conftest import MadeSolution
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.output import run_folder
-from pathwalker_cli.output.run_folder import write_run
+from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies.verdict import SnappedSprings, SpringVerdict, StopVerdict, Verdict
 
 HOSTILE = "<script>alert(1)</script>"

@@ -30,10 +30,10 @@ from pathwalker_cli.animation.html import html_page
 from pathwalker_cli.animation.viewer import poses, walker_geometry
 from pathwalker_cli.cli import cli
 from pathwalker_cli.conventions import GENERATORS, SIDES, SUFFIX
+from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
-from pathwalker_cli.ocp.solution import GaitSolution
-from pathwalker_cli.output import run_folder
-from pathwalker_cli.output.run_folder import write_run
+from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.run_folder import write_run
 
 MadeSolution = Callable[..., GaitSolution]
 HOSTILE = "<!--<script><img src=x onerror=alert(1)>"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pathwalker_cli.config import load_config, with_values
-from pathwalker_cli.ocp.balance import balance
-from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.ocp.solve import solve_study
+from pathwalker_cli.gait.solve import solve_study
+from pathwalker_cli.stride.balance import balance
+from pathwalker_cli.stride.series import GaitSeries
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from pathwalker_cli.nlp.frozen import FrozenTerms
+from pathwalker_cli.nlp.ipopt import IpoptSettings, solve_program
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
-from pathwalker_cli.ocp.frozen import FrozenTerms
-from pathwalker_cli.ocp.ipopt import IpoptSettings, solve_program
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.ocp.problem import (
     Boundary,

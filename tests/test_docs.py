@@ -19,14 +19,14 @@ from pathwalker_cli.cli import COMMANDS
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.goals import GOALS
+from pathwalker_cli.gait.goals import GOALS
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.yaml_file import read_mapping, validate
 from pathwalker_cli.model.contact import PHASES
-from pathwalker_cli.output.orthosis_text import angle_words
-from pathwalker_cli.output.run_metrics import RunInputs, run_metrics
 from pathwalker_cli.patient import OrthosisData
 from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.results.orthosis_text import angle_words
+from pathwalker_cli.results.run_metrics import RunInputs, run_metrics
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"

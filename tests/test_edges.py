@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import pytest
 
-from pathwalker_cli.ocp.resolve import Optimum
+from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.studies.edges import Edge, find_edge
 
 

@@ -33,9 +33,9 @@ from pathwalker_cli.evaluation.run import gait_of_series
 from pathwalker_cli.evaluation.spread import Spread, spread
 from pathwalker_cli.inverse.bands import POINTS
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.metrics import gait_metrics
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.metrics import gait_metrics
 from pathwalker_cli.trajectory import Trajectory
 from published_motions import needs_published, published_gait, sampled_gait, sparse_gait
 

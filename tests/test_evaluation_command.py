@@ -14,11 +14,11 @@ from click.testing import CliRunner, Result
 
 from pathwalker_cli.cli import cli
 from pathwalker_cli.evaluation import figures
+from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.ocp.solution import GaitSolution
-from pathwalker_cli.output import run_folder
-from pathwalker_cli.output.run_folder import write_run
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.run_folder import write_run
 
 MadeSolution = Callable[..., GaitSolution]
 CHILD = Path(__file__).parent / "data" / "child-10y" / "patient.yaml"

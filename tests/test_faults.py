@@ -29,10 +29,10 @@ from pathwalker_cli.io import atomic
 from pathwalker_cli.io.atomic import atomic_open, check_room, sweep
 from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.lock import locked
-from pathwalker_cli.ocp import tape_store
-from pathwalker_cli.output import run_folder
-from pathwalker_cli.output.run_folder import claimed_run, load_run, release_runs, write_run
-from pathwalker_cli.output.run_metrics import run_inputs
+from pathwalker_cli.nlp import tape_store
+from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.run_folder import claimed_run, load_run, release_runs, write_run
+from pathwalker_cli.results.run_metrics import run_inputs
 from pathwalker_cli.studies import journal
 from pathwalker_cli.studies import run as studies_run
 from pathwalker_cli.studies.base import claimed_folder
@@ -424,7 +424,7 @@ def test_a_clock_that_jumps_back_changes_no_result_but_the_date(
 
     write_run(tmp_path / "today", made_solution())
     monkeypatch.setattr("time.time", lambda: 0.0)
-    monkeypatch.setattr("pathwalker_cli.output.versions.datetime", Past)
+    monkeypatch.setattr("pathwalker_cli.versions.datetime", Past)
     write_run(tmp_path / "past", made_solution())
     ours, theirs = (load_run(tmp_path / name).metrics for name in ("past", "today"))
     assert ours.pop("date") == "1999-12-31"
@@ -436,7 +436,7 @@ def test_a_clock_that_jumps_back_changes_no_result_but_the_date(
 
 def test_nothing_reads_the_clock_of_the_wall_but_for_dates() -> None:
     package = Path(atomic.__file__).parent.parent
-    told = {"output/versions.py", "reproduce/pipeline.py", "report/runs.py"}
+    told = {"results/versions.py", "reproduce/pipeline.py", "report/runs.py"}
     found = {
         str(path.relative_to(package))
         for path in package.rglob("*.py")
@@ -451,7 +451,7 @@ POOL = """
 import os, signal, sys, time
 from pathlib import Path
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.ocp.processes import called_elsewhere
+from pathwalker_cli.io.processes import called_elsewhere
 
 def work(seconds):
     if seconds < 0:

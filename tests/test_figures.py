@@ -13,7 +13,7 @@ import pytest
 
 import pathwalker_cli
 from figure_measure import LEAST, WIDTH, complaints
-from pathwalker_cli.output.figures.style import COLUMN, STYLE, TEXT, dress, new_figure
+from pathwalker_cli.stride.figures.style import COLUMN, STYLE, TEXT, dress, new_figure
 
 PACKAGE = Path(pathwalker_cli.__file__).parent
 FOR_SCREENS = ("animation/film.py",)
@@ -31,7 +31,7 @@ def calls() -> Iterator[tuple[str, ast.Call]]:
 
 def test_all_figures_are_as_wide_as_a_column() -> None:
     made = {name for name, call in calls() if ast.unparse(call.func) == "Figure"}
-    assert made == {"output/figures/style.py"}, "figures are made by `new_figure`"
+    assert made == {"stride/figures/style.py"}, "figures are made by `new_figure`"
     assert new_figure(2.0).get_figwidth() == COLUMN == pytest.approx(WIDTH, abs=0.01)
 
 

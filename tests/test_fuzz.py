@@ -36,11 +36,11 @@ from pathwalker_cli.io.opensim import read_opensim
 from pathwalker_cli.io.recordings import read_compact
 from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.io.yaml_file import read_mapping
-from pathwalker_cli.ocp import tape_store
-from pathwalker_cli.output.motion_file import read_motion, write_motion
-from pathwalker_cli.output.multipliers_file import read_multipliers
+from pathwalker_cli.nlp import tape_store
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.results.motion_file import read_motion, write_motion
+from pathwalker_cli.results.multipliers_file import read_multipliers
 from pathwalker_cli.studies.batch.schema import load_batch
 
 Read = Callable[[Path], Any]

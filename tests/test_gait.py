@@ -12,19 +12,19 @@ import pytest
 from pathwalker_cli.config import BoundsConfig, StudyConfig, load_config
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.gait import mesh as meshing
+from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.solve import GaitSolver, solve_study
+from pathwalker_cli.gait.start import recorded_stride
 from pathwalker_cli.io.recordings import read_recording
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.ocp import mesh as meshing
-from pathwalker_cli.ocp.blocks import Block
+from pathwalker_cli.nlp.blocks import Block
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
-from pathwalker_cli.ocp.gait_bounds import gait_bounds
 from pathwalker_cli.ocp.multipliers import transferred
-from pathwalker_cli.ocp.series import actuator_torques
-from pathwalker_cli.ocp.solve import GaitSolver, solve_study
-from pathwalker_cli.ocp.start import recorded_stride
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.stride.series import actuator_torques
 
 CHILD = str(Path(__file__).parent / "data" / "child-10y" / "patient.yaml")
 
@@ -107,7 +107,7 @@ def test_motion_and_unknowns_are_inverse(program: CollocationProgram) -> None:
 
 
 def test_multipliers_carry_over_unchanged_to_the_same_mesh(program: CollocationProgram) -> None:
-    from pathwalker_cli.ocp.ipopt import Multipliers
+    from pathwalker_cli.nlp.ipopt import Multipliers
 
     rng = np.random.default_rng(6)
     before = Multipliers(np.zeros(program.program.size), rng.normal(size=program.program.rows))

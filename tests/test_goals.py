@@ -12,11 +12,11 @@ from helpers import stylised_series
 from pathwalker_cli.config import load_config, smoke_version, with_values
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.goals import COMFORT_COORDINATES, GOALS, Goals
+from pathwalker_cli.gait.goal_costs import goal_values, with_goal_costs
+from pathwalker_cli.gait.goals import COMFORT_COORDINATES, GOALS, Goals
+from pathwalker_cli.gait.solve import solve_study
 from pathwalker_cli.model.contact import PHASES, phase_named
-from pathwalker_cli.ocp.goal_costs import goal_values, with_goal_costs
 from pathwalker_cli.ocp.phased import PhasedMotion
-from pathwalker_cli.ocp.solve import solve_study
 
 WEIGHT = 262.0
 RANGES = {"knee_r": (0.3, 0.5), "lumbar": (0.0, 0.1)}

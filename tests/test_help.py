@@ -28,10 +28,10 @@ from pathwalker_cli.commands.complete import (
 )
 from pathwalker_cli.commands.examples import EXAMPLES
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.ocp.ipopt import ProgressReport
-from pathwalker_cli.ocp.solution import GaitSolution
-from pathwalker_cli.output import run_folder
+from pathwalker_cli.gait.solution import GaitSolution
+from pathwalker_cli.nlp.ipopt import ProgressReport
 from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.results import run_folder
 from pathwalker_cli.studies import run as study_run
 from pathwalker_cli.studies.batch import cases, study
 from pathwalker_cli.studies.batch.ledger import Ended

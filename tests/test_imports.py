@@ -15,17 +15,21 @@ PACKAGE = Path(pathwalker_cli.__file__).parent
 ROOT = "pathwalker_cli"
 
 LAYERS = (
-    {"conventions", "errors", "paths"},
+    {"conventions", "errors", "paths", "versions"},
     {"trajectory"},
     {"io"},
-    {"patient_blocks", "model.proportions"},
+    {"patient.blocks", "patient.proportions"},
     {"patient"},
     {"io.recordings"},
     {"model"},
-    {"problems", "variation", "goals"},
+    {"problems", "patient.variation", "gait.goals"},
     {"config"},
-    {"ocp", "inverse"},
-    {"output"},
+    {"nlp.frozen"},
+    {"ocp.problem", "ocp.phased"},
+    {"ocp", "nlp"},
+    {"stride"},
+    {"gait", "inverse", "ocp.solve"},
+    {"results"},
     {"evaluation"},
     {"studies"},
     {"reproduce", "report", "animation", "starter", "checking", "verification"},
@@ -34,24 +38,25 @@ LAYERS = (
 )
 """Later ones may import earlier ones. `io.recordings` knows patients, who know `io`."""
 
-APART = ({"ocp", "inverse"},)
+APART = ({"gait", "inverse"},)
 """Members of one layer that must not know each other."""
 
 CONFINED = {
-    "casadi": ("model", "ocp", "commands.doctor"),
+    "casadi": ("model", "nlp", "ocp", "stride", "gait", "commands.doctor"),
     "pinocchio": (
         "model",
-        "ocp",
+        "nlp",
+        "gait",
         "inverse",
-        "output.body",
+        "stride",
         "animation.viewer",
         "starter.example",
     ),
     "jinja2": ("io.templates", "animation.html", "report.html", "starter"),
     "matplotlib": (
         "animation.film",
-        "output.figures",
-        "output.recorded_figures",
+        "stride.figures",
+        "inverse.recorded_figures",
         "evaluation.ankle_panels",
         "evaluation.cycle_curves",
         "evaluation.figures",
@@ -65,7 +70,7 @@ CONFINED = {
         "studies.uncertainty.figures",
     ),
     "click": ("cli", "commands"),
-    "rich": ("commands", "output"),
+    "rich": ("commands", "inverse", "results", "stride"),
     "dask": ("studies.batch.cluster",),
     "dask_jobqueue": ("studies.batch.cluster",),
     "distributed": ("studies.batch.cluster",),
@@ -133,7 +138,7 @@ def home(module: str) -> tuple[int, str]:
 
 
 def test_the_package_is_found() -> None:
-    assert {"cli", "config", "ocp.solve", "commands.solve"} <= modules().keys()
+    assert {"cli", "config", "gait.solve", "commands.solve"} <= modules().keys()
     assert "studies.run" in own_imports("commands.solve"), "imports inside functions count"
 
 

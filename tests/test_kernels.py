@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from pathwalker_cli.cli import cli
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.ocp.kernels import kernels_level, kernels_path
+from pathwalker_cli.nlp.kernels import kernels_level, kernels_path
 
 LEVELS = ("generic", "x86-64-v3", "x86-64-v4")
 

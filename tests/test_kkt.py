@@ -7,15 +7,15 @@ import pytest
 from scipy import sparse
 
 from pathwalker_cli.config import load_config, smoke_version, with_values
+from pathwalker_cli.gait.neighbourhood import Neighbourhood
+from pathwalker_cli.gait.resolve import Resolver, warm_start_for
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.nlp.ipopt import IpoptSettings, solve_program
+from pathwalker_cli.nlp.kkt import KktSystem
+from pathwalker_cli.nlp.symmetric import SymmetricSystem
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
-from pathwalker_cli.ocp.ipopt import IpoptSettings, solve_program
-from pathwalker_cli.ocp.kkt import KktSystem
-from pathwalker_cli.ocp.neighbourhood import Neighbourhood
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers
-from pathwalker_cli.ocp.resolve import Resolver, warm_start_for
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.ocp.symmetric import SymmetricSystem
 from pathwalker_cli.studies.measures import measures
 from test_collocation import at_rest, double_integrator
 

@@ -19,8 +19,8 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.commands import landscape as command
 from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import ConfigError, NotConvergedError
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.output.run_folder import write_run
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.landscape import solve as module

@@ -12,11 +12,11 @@ import yaml
 from made_patients import mirror_image
 from pathwalker_cli.config import StudyConfig, load_config, smoke_version, with_values
 from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, mirror_permutation, mirrored
+from pathwalker_cli.gait.problem import ACCELERATIONS, ACTIVATIONS, RATES, RESERVES, VELOCITIES
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.gait import ACCELERATIONS, ACTIVATIONS, RATES, RESERVES, VELOCITIES
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
-from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.patient import Patient, load_patient
 
 HALF = len(PHASES) // 2

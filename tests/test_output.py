@@ -22,11 +22,12 @@ from pathwalker_cli.io.json_file import json_text, write_json
 from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.model.walker import ANKLES
 from pathwalker_cli.ocp.phased import PhasedMotion
-from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.output.ankle_profile import ankle_torque_line
-from pathwalker_cli.output.cycle import own_cycle
-from pathwalker_cli.output.feet import centre_of_pressure, stance
-from pathwalker_cli.output.figures import (
+from pathwalker_cli.results.tables import TABLES, controls_table, forces_table, torques_table
+from pathwalker_cli.results.text import active_bounds, summary, summary_renderable
+from pathwalker_cli.stride.ankle_profile import ankle_torque_line
+from pathwalker_cli.stride.cycle import own_cycle
+from pathwalker_cli.stride.feet import centre_of_pressure, stance
+from pathwalker_cli.stride.figures import (
     FIGURES,
     Band,
     Reference,
@@ -34,9 +35,8 @@ from pathwalker_cli.output.figures import (
     make_figure,
     save_figures,
 )
-from pathwalker_cli.output.metrics import GaitMetrics, gait_metrics
-from pathwalker_cli.output.tables import TABLES, controls_table, forces_table, torques_table
-from pathwalker_cli.output.text import active_bounds, summary, summary_renderable
+from pathwalker_cli.stride.metrics import GaitMetrics, gait_metrics
+from pathwalker_cli.stride.series import GaitSeries
 
 RANGES = {"dorsiflexion_stiffness": (5.0, 92.0), "plantarflexion_stiffness": (10.0, 92.0)}
 

@@ -22,9 +22,9 @@ from pathwalker_cli.config import load_config, with_values
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
-from pathwalker_cli.ocp.solution import GaitSolution
-from pathwalker_cli.output import run_folder
-from pathwalker_cli.output.run_folder import write_run
+from pathwalker_cli.gait.solution import GaitSolution
+from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies.base import base_run, load_study, require_optimum
 from pathwalker_cli.studies.journal import Journal
 from pathwalker_cli.studies.measures import COMPARED

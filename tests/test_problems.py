@@ -12,15 +12,15 @@ from pathwalker_cli import build_walker, load_patient
 from pathwalker_cli.config import StudyConfig, load_config, smoke_version
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, mirror_permutation, mirrored
 from pathwalker_cli.errors import ConfigError, DataError
+from pathwalker_cli.gait.by_shooting import solve_by_shooting
+from pathwalker_cli.gait.passage import passage_samples, recorded_passage
+from pathwalker_cli.gait.solve import GaitSolver, solve_study
+from pathwalker_cli.gait.starts import solve_from_starts, spread_starts
+from pathwalker_cli.gait.symmetry import asymmetries
 from pathwalker_cli.io.recordings import read_recording
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.muscle import activation_rate, excitation_from_rate
-from pathwalker_cli.ocp.by_shooting import solve_by_shooting
-from pathwalker_cli.ocp.passage import passage_samples, recorded_passage
-from pathwalker_cli.ocp.solve import GaitSolver, solve_study
-from pathwalker_cli.ocp.starts import solve_from_starts, spread_starts
-from pathwalker_cli.ocp.symmetry import asymmetries
-from pathwalker_cli.ocp.verify import reintegrate
+from pathwalker_cli.stride.verify import reintegrate
 
 PATIENT, HEALTHY = "sreenivasa2017-patient", "sreenivasa2017-healthy"
 

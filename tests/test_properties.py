@@ -46,7 +46,12 @@ from pathwalker_cli.conventions import (
     to_degrees,
 )
 from pathwalker_cli.errors import ConfigError, PatientError
-from pathwalker_cli.goals import Goals
+from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.cost_terms import cost_terms
+from pathwalker_cli.gait.goals import Goals
+from pathwalker_cli.gait.problem import GaitProblem
+from pathwalker_cli.gait.symmetry import asymmetries, full_stride
+from pathwalker_cli.inverse.recorded_files import write_strengths_yaml
 from pathwalker_cli.io.opensim import read_opensim, write_opensim
 from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.io.yaml_file import yaml_text
@@ -63,22 +68,17 @@ from pathwalker_cli.model.muscle import (
 )
 from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_curve, orthosis_torque
 from pathwalker_cli.model.walker import Walker, build_walker
-from pathwalker_cli.ocp.cost_terms import cost_terms
-from pathwalker_cli.ocp.gait import GaitProblem
-from pathwalker_cli.ocp.gait_bounds import gait_bounds
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
-from pathwalker_cli.ocp.series import gait_series
-from pathwalker_cli.ocp.symmetry import asymmetries, full_stride
-from pathwalker_cli.output.cycle import BOTH_SIDES, own_cycle
-from pathwalker_cli.output.metrics import gait_metrics
-from pathwalker_cli.output.motion_file import read_motion, write_motion
-from pathwalker_cli.output.orthosis_text import angle_words
-from pathwalker_cli.output.recorded_files import write_strengths_yaml
-from pathwalker_cli.output.run_folder import config_text
-from pathwalker_cli.output.run_metrics import run_inputs
-from pathwalker_cli.output.text import summary_rows
 from pathwalker_cli.patient import Patient, load_patient
-from pathwalker_cli.patient_blocks import OrthosisData
+from pathwalker_cli.patient.blocks import OrthosisData
+from pathwalker_cli.results.motion_file import read_motion, write_motion
+from pathwalker_cli.results.orthosis_text import angle_words
+from pathwalker_cli.results.run_folder import config_text
+from pathwalker_cli.results.run_metrics import run_inputs
+from pathwalker_cli.results.text import summary_rows
+from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
+from pathwalker_cli.stride.metrics import gait_metrics
+from pathwalker_cli.stride.series import gait_series
 from pathwalker_cli.trajectory import Trajectory
 
 SEEDS: Final = st.integers(0, 2**32 - 1)

@@ -707,9 +707,9 @@ def test_kinds_of_pages_do_not_mix(runs: Path, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study of four recorded trials."""
+    from pathwalker_cli.inverse import recorded_study
     from pathwalker_cli.inverse.evaluate import dynamics_trials
     from pathwalker_cli.inverse.study_tables import residual_tables, strength_table
-    from pathwalker_cli.output import recorded_study
 
     folder = tmp_path_factory.mktemp("recorded")
     study = load_inverse_dynamics("inverse-dynamics", ("conditions=[barefoot]",))

@@ -18,10 +18,9 @@ from helpers import stylised_series
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperNumber
+from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.ocp.gait_bounds import gait_bounds
-from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
-from pathwalker_cli.output import run_folder
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce import pipeline
 from pathwalker_cli.reproduce.comparison import Ours, Row
@@ -30,6 +29,7 @@ from pathwalker_cli.reproduce.inverse_study import inverse_config, inverse_resul
 from pathwalker_cli.reproduce.plan import ORDER, SEVERAL, planned_studies
 from pathwalker_cli.reproduce.results import Results, evaluated
 from pathwalker_cli.reproduce.words import deviation, label, ours_text, printed, subject
+from pathwalker_cli.results import run_folder
 from pathwalker_cli.studies import run as study_run
 
 MadeSolution = Callable[..., GaitSolution]

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.patient.variation import Variation, varied
 from pathwalker_cli.studies.sensitivity.figures import save_sensitivity_figure
 from pathwalker_cli.studies.sensitivity.result import Check, Sensitivities, Sensitivity
 from pathwalker_cli.studies.sensitivity.study import default_places
@@ -21,7 +22,6 @@ from pathwalker_cli.studies.sensitivity.text import (
     sensitivity_lines,
     write_sensitivities,
 )
-from pathwalker_cli.variation import Variation, varied
 
 PATIENT = load_patient("sreenivasa2017-patient")
 BASE = {

@@ -12,6 +12,15 @@ from scipy.integrate import solve_ivp
 
 from helpers import stylised_series, walker_of
 from pathwalker_cli.config import load_config
+from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.problem import GaitProblem, GaitWeights
+from pathwalker_cli.gait.shooting import (
+    EXCITATIONS,
+    gait_shooting,
+    rounded_rate,
+    solve_shooting,
+)
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.muscle import (
     ACTIVATION_TIME,
@@ -19,10 +28,8 @@ from pathwalker_cli.model.muscle import (
     activation_rate,
     excitation_from_rate,
 )
-from pathwalker_cli.ocp.frozen import FrozenTerms
-from pathwalker_cli.ocp.gait import GaitProblem, GaitWeights
-from pathwalker_cli.ocp.gait_bounds import gait_bounds
-from pathwalker_cli.ocp.ipopt import IpoptSettings, solve_program
+from pathwalker_cli.nlp.frozen import FrozenTerms
+from pathwalker_cli.nlp.ipopt import IpoptSettings, solve_program
 from pathwalker_cli.ocp.problem import (
     Boundary,
     BoundTable,
@@ -34,15 +41,8 @@ from pathwalker_cli.ocp.problem import (
 )
 from pathwalker_cli.ocp.shooting import ShootingProgram
 from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks, ShootingProblem
-from pathwalker_cli.ocp.shooting_gait import (
-    EXCITATIONS,
-    gait_shooting,
-    rounded_rate,
-    solve_shooting,
-)
 from pathwalker_cli.ocp.shooting_motion import Shooter, ShootingNodes
 from pathwalker_cli.ocp.shooting_steps import CASH_KARP, adaptive_steps, fixed_steps
-from pathwalker_cli.ocp.solve import GaitSolver
 
 STIFFNESS = np.array([40.0, 50.0, 10.0, 20.0])
 

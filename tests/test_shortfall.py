@@ -11,12 +11,12 @@ import pytest
 from helpers import stylised_series, walker_of
 from pathwalker_cli.config import load_config, with_values
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
-from pathwalker_cli.ocp import mesh as meshing
-from pathwalker_cli.ocp.gait_bounds import gait_bounds, helped_bounds
-from pathwalker_cli.ocp.shortfall import MissingTorque, Shortfall, missing_torques
-from pathwalker_cli.ocp.solution import TOO_WEAK, GaitSolution
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.output.solve_text import failure_text, shortfall_text
+from pathwalker_cli.gait import mesh as meshing
+from pathwalker_cli.gait.bounds import gait_bounds, helped_bounds
+from pathwalker_cli.gait.shortfall import MissingTorque, Shortfall, missing_torques
+from pathwalker_cli.gait.solution import TOO_WEAK, GaitSolution
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.results.solve_text import failure_text, shortfall_text
 
 
 def test_help_counts_for_the_muscle_that_pulls_its_way_and_small_help_does_not() -> None:

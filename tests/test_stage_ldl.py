@@ -9,12 +9,12 @@ import pytest
 from scipy import sparse
 
 from pathwalker_cli.config import load_config
+from pathwalker_cli.gait.mesh import first
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.nlp.elimination import Elimination, in_order_of, stage_keys
+from pathwalker_cli.nlp.kernels import kernels
+from pathwalker_cli.nlp.stage_ldl import StageFactors, stage_factors
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.elimination import Elimination, in_order_of, stage_keys
-from pathwalker_cli.ocp.kernels import kernels
-from pathwalker_cli.ocp.mesh import first
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.ocp.stage_ldl import StageFactors, stage_factors
 
 pytestmark = pytest.mark.skipif(
     kernels() is None and bool(os.environ.get("PATHWALKER_ALLOW_PURE_PYTHON")),

@@ -11,12 +11,12 @@ import pytest
 
 from conftest import MadeSolution
 from pathwalker_cli.errors import DataError, InputError
-from pathwalker_cli.output import run_folder
-from pathwalker_cli.output.metrics_model import RunMetrics
 from pathwalker_cli.report.build import page_of
 from pathwalker_cli.report.folders import STUDIES, Kind, studies_near
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.study_tables import study_section
+from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.metrics_model import RunMetrics
 from pathwalker_cli.studies.verdict import verdict_of_metrics
 from pathwalker_cli.studies.verdict_text import verdict_lines
 from report_runs import write_made_run

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from pathwalker_cli.config import load_config
-from pathwalker_cli.ocp import blocks
-from pathwalker_cli.ocp import mesh as meshing
-from pathwalker_cli.ocp.blocks import Block, BlockProgram, Occurrences
+from pathwalker_cli.gait import mesh as meshing
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.nlp import blocks
+from pathwalker_cli.nlp.blocks import Block, BlockProgram, Occurrences
+from pathwalker_cli.nlp.kernels import kernels
+from pathwalker_cli.nlp.tape import OPERATIONS, Tape
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.kernels import kernels
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.ocp.tape import OPERATIONS, Tape
 
 COUNTS = (1, 7, 8, 9, 17)
 ARGUMENTS = {"nlp": 2, "grad_f": 2, "jac_g": 2, "hess_lag": 4}

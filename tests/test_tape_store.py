@@ -12,16 +12,16 @@ import pytest
 
 import pathwalker_cli
 from pathwalker_cli.config import load_config
-from pathwalker_cli.ocp import mesh as meshing
-from pathwalker_cli.ocp import tape_store
-from pathwalker_cli.ocp.assembly import KINDS
-from pathwalker_cli.ocp.blocks import Block, KeptBlock
+from pathwalker_cli.gait import mesh as meshing
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.gait.structures import gait_blocks
+from pathwalker_cli.nlp import tape_store
+from pathwalker_cli.nlp.assembly import KINDS
+from pathwalker_cli.nlp.blocks import Block, KeptBlock
+from pathwalker_cli.nlp.kernels import kernels, kernels_path
+from pathwalker_cli.nlp.tape import Tape
+from pathwalker_cli.nlp.tape_store import cache_folder, keep_tapes, kept_tapes
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.kernels import kernels, kernels_path
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.ocp.structures import gait_blocks
-from pathwalker_cli.ocp.tape import Tape
-from pathwalker_cli.ocp.tape_store import cache_folder, keep_tapes, kept_tapes
 
 pytestmark = pytest.mark.skipif(
     kernels() is None and bool(os.environ.get("PATHWALKER_ALLOW_PURE_PYTHON")),

@@ -17,10 +17,10 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config, study_patient, with_values
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.ocp.solution import GaitSolution
-from pathwalker_cli.output import run_folder
-from pathwalker_cli.output.run_folder import write_run
+from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies import pool
 from pathwalker_cli.studies.base import base_run, load_study
 from pathwalker_cli.studies.uncertainty import study as module

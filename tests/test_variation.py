@@ -7,13 +7,13 @@ import pytest
 
 from pathwalker_cli.config import load_config, study_patient, with_values
 from pathwalker_cli.errors import ConfigError, PatientError
+from pathwalker_cli.gait.mesh import uniform
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
-from pathwalker_cli.ocp.mesh import uniform
-from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.variation import Variation, varied
+from pathwalker_cli.patient.variation import Variation, varied
 
 PATIENT = load_patient("sreenivasa2017-patient")
 

@@ -12,11 +12,11 @@ from conftest import MadeSolution
 from helpers import stylised_series
 from pathwalker_cli.config import load_config, smoke_version, with_values
 from pathwalker_cli.errors import PatientError
+from pathwalker_cli.gait.solution import LocalOptimum
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.yaml_file import validate
-from pathwalker_cli.ocp.solution import LocalOptimum
-from pathwalker_cli.ocp.solve import GaitSolver
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.patient_blocks import RealSpring, SpringSet
+from pathwalker_cli.patient.blocks import RealSpring, SpringSet
 from pathwalker_cli.studies.verdict import (
     SHARE,
     SnappedSprings,

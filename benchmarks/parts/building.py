@@ -34,11 +34,11 @@ def steps(problem: str, intervals: int) -> dict[str, float]:
     """
     began = time.process_time()
     from pathwalker_cli.config import load_config, study_patient
+    from pathwalker_cli.gait import mesh as meshing
+    from pathwalker_cli.gait.solve import GaitSolver
     from pathwalker_cli.model.walker import build_walker
-    from pathwalker_cli.ocp import mesh as meshing
+    from pathwalker_cli.nlp.ipopt import NlpSolver
     from pathwalker_cli.ocp.collocation import CollocationProgram
-    from pathwalker_cli.ocp.ipopt import NlpSolver
-    from pathwalker_cli.ocp.solve import GaitSolver
 
     imports = time.process_time() - began
     config = load_config(problem)

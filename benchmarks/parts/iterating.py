@@ -16,11 +16,11 @@ import casadi as ca
 import numpy as np
 
 from pathwalker_cli.config import load_config
-from pathwalker_cli.ocp import blocks
-from pathwalker_cli.ocp.assembly import FUNCTIONS
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.nlp import blocks
+from pathwalker_cli.nlp.assembly import FUNCTIONS
+from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpSolver
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.ipopt import IpoptSettings, NlpSolver
-from pathwalker_cli.ocp.solve import GaitSolver
 
 TALK: Final = {"print_level": 5, "print_timing_statistics": "yes"}
 TIMING: Final = re.compile(

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pathwalker_cli.ocp.kernels import kernels_path
+from pathwalker_cli.nlp.kernels import kernels_path
 
 PACKAGES = ("casadi", "pin", "numpy", "scipy")
 

@@ -9,10 +9,10 @@ from typing import Any, Final
 from parts.building import timed
 from pathwalker_cli.config import with_values
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.ocp.neighbourhood import Neighbourhood
-from pathwalker_cli.ocp.resolve import Optimum, Resolver
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.output.run_folder import load_run
+from pathwalker_cli.gait.neighbourhood import Neighbourhood
+from pathwalker_cli.gait.resolve import Optimum, Resolver
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.studies.base import resolver_of
 
 SPRINGS: Final = "one spring 5 % softer, warm"

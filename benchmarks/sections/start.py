@@ -11,7 +11,7 @@ from measure import Finished, Sample, command, pathwalker
 from report import Cell, Report
 
 ABOUT = "Start of the program"
-IMPORT = "import pathwalker_cli.ocp.solve"
+IMPORT = "import pathwalker_cli.gait.solve"
 
 
 def run(context: Context) -> Report:

@@ -12,8 +12,8 @@ import numpy as np
 
 from pathwalker_cli.animation.frames import GaitFrames
 from pathwalker_cli.conventions import GENERATORS, SUFFIX, Side
-from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.figures.style import FORCE_LENGTH
+from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.figures.style import FORCE_LENGTH
 
 __all__ = ["Drawing", "Shape", "View", "common_view", "drawing", "force_scale", "words"]
 

@@ -48,8 +48,8 @@ from pathwalker_cli.animation.look import (
 )
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import output_path
-from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.figures.style import BODY_COLOUR, FORCE_COLOUR, STYLE
+from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.figures.style import BODY_COLOUR, FORCE_COLOUR, STYLE
 
 __all__ = ["MOST_FRAMES", "film_rate", "write_film"]
 

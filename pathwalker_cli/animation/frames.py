@@ -13,10 +13,10 @@ import numpy as np
 from pathwalker_cli.conventions import Condition, Side
 from pathwalker_cli.evaluation.run import run_names, run_notes, stride_of_run
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.output.body import body_points
-from pathwalker_cli.output.cycle import BOTH_SIDES, foot_strike_time, switching_times
-from pathwalker_cli.output.feet import centre_of_pressure
+from pathwalker_cli.stride.body import body_points
+from pathwalker_cli.stride.cycle import BOTH_SIDES, foot_strike_time, switching_times
+from pathwalker_cli.stride.feet import centre_of_pressure
+from pathwalker_cli.stride.series import GaitSeries
 
 __all__ = ["GaitFrames", "gait_frames", "run_frames"]
 

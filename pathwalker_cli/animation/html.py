@@ -32,8 +32,8 @@ from pathwalker_cli.animation.look import (
 )
 from pathwalker_cli.conventions import GENERATORS
 from pathwalker_cli.io.templates import templates
-from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.figures.style import BODY_COLOUR, FORCE_COLOUR
+from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.figures.style import BODY_COLOUR, FORCE_COLOUR
 
 __all__ = ["RATE", "html_page"]
 

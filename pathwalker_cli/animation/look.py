@@ -9,7 +9,7 @@ from typing import Final
 from pathwalker_cli.animation.drawing import Shape
 from pathwalker_cli.animation.frames import GaitFrames
 from pathwalker_cli.conventions import Side
-from pathwalker_cli.output.figures.style import BODY_COLOUR, FORCE_COLOUR, LINE_COLOUR
+from pathwalker_cli.stride.figures.style import BODY_COLOUR, FORCE_COLOUR, LINE_COLOUR
 
 __all__ = [
     "ACTIVATION_COLOURS",

@@ -16,9 +16,9 @@ from pinocchio.visualize import MeshcatVisualizer
 from pathwalker_cli.conventions import COORDINATES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.output.body import body_points
-from pathwalker_cli.output.cycle import BOTH_SIDES
+from pathwalker_cli.stride.body import body_points
+from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.series import GaitSeries
 
 __all__ = ["open_viewer", "poses", "show", "walker_geometry"]
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Final
 
 from pathwalker_cli.conventions import GRAVITY, SIDES
-from pathwalker_cli.model.proportions import SOURCE, default_length
 from pathwalker_cli.patient import OrthosisData, Patient
+from pathwalker_cli.patient.proportions import SOURCE, default_length
 
 __all__ = ["odd_orthosis", "odd_patient", "odd_speed"]
 

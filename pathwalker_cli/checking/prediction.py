@@ -14,17 +14,17 @@ from pathwalker_cli.config import StudyConfig, load_config, study_patient
 from pathwalker_cli.config.values import changed_values
 from pathwalker_cli.conventions import CONDITIONS, STIFFNESSES
 from pathwalker_cli.errors import DataError, PatientError, placed
+from pathwalker_cli.gait import mesh as meshing
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.model.healthy import healthy_strength
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.ocp import mesh as meshing
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.output.orthosis_text import orthosis_rows
-from pathwalker_cli.output.run_folder import ENTRIES, check_target, default_folder
-from pathwalker_cli.output.solve_text import notes_together
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient_blocks import Strengths
+from pathwalker_cli.patient.blocks import Strengths
+from pathwalker_cli.results.orthosis_text import orthosis_rows
+from pathwalker_cli.results.run_folder import ENTRIES, check_target, default_folder
+from pathwalker_cli.results.solve_text import notes_together
 from pathwalker_cli.studies.batch.checks import check_patient
 
 __all__ = [

@@ -13,7 +13,7 @@ import numpy as np
 from pathwalker_cli.checking.plausible import odd_speed
 from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.ocp.solve import GaitSolver
+from pathwalker_cli.gait.solve import GaitSolver
 
 __all__ = ["contradictions", "oddities"]
 

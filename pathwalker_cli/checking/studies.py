@@ -10,8 +10,9 @@ from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError, placed
-from pathwalker_cli.ocp.solve import GaitSolver
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.patient import Patient, load_patient
+from pathwalker_cli.patient.variation import Variation, varied
 from pathwalker_cli.studies.base import NeighbourStudy, base_config, load_study
 from pathwalker_cli.studies.batch.cases import load_cases
 from pathwalker_cli.studies.landscape.study import LandscapeStudy, axis_values
@@ -21,7 +22,6 @@ from pathwalker_cli.studies.springs import Ranges, free_springs, require_springs
 from pathwalker_cli.studies.tradeoff.study import TradeoffStudy, require_prediction
 from pathwalker_cli.studies.uncertainty.draws import draw, inputs_of
 from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, draw_configs
-from pathwalker_cli.variation import Variation, varied
 
 __all__ = [
     "check_batch",

@@ -57,8 +57,8 @@ def _write(out: Path, found: Comparison) -> None:
     """Write tables and figures, all or none."""
     from pathwalker_cli.evaluation.figures import save_overlays
     from pathwalker_cli.evaluation.traces import traces
+    from pathwalker_cli.inverse.recorded_files import staged_folder
     from pathwalker_cli.io.json_file import write_json
-    from pathwalker_cli.output.recorded_files import staged_folder
     from pathwalker_cli.report.compare_text import comparison_content, write_comparison_csv
 
     with staged_folder(out) as folder:

@@ -66,7 +66,7 @@ def _looked_at(part: Callable[[], list[Finding]]) -> list[Finding]:
 
 
 def _versions() -> list[Finding]:
-    from pathwalker_cli.output.versions import MISSING, versions
+    from pathwalker_cli.versions import MISSING, versions
 
     return [Finding(name, text != MISSING, True, text) for name, text in versions().items()]
 
@@ -100,8 +100,8 @@ def _solver() -> list[Finding]:
 
 
 def _speed() -> list[Finding]:
-    from pathwalker_cli.ocp.kernels import kernels_path
-    from pathwalker_cli.ocp.tape_store import cache_folder, kept_files
+    from pathwalker_cli.nlp.kernels import kernels_path
+    from pathwalker_cli.nlp.tape_store import cache_folder, kept_files
 
     path, folder = kernels_path(), cache_folder()
     slow = "none: solves take several times as long; install again with a C++ compiler at hand"

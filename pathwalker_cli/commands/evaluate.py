@@ -93,8 +93,8 @@ def _write(out: Path, evaluations: Sequence[Evaluation], content: dict[str, Any]
     from pathwalker_cli.evaluation.figures import save_evaluation_figures
     from pathwalker_cli.evaluation.files import write_csv
     from pathwalker_cli.evaluation.traces import lone_trace
+    from pathwalker_cli.inverse.recorded_files import staged_folder
     from pathwalker_cli.io.json_file import write_json
-    from pathwalker_cli.output.recorded_files import staged_folder
 
     with staged_folder(out) as folder:
         write_json(folder / "evaluation.json", content)

@@ -12,7 +12,7 @@ from pathwalker_cli.commands.complete import complete_configs, complete_runs, se
 from pathwalker_cli.commands.json_output import json_option
 
 if TYPE_CHECKING:
-    from pathwalker_cli.output.run_folder import Run
+    from pathwalker_cli.results.run_folder import Run
     from pathwalker_cli.studies.base import NeighbourStudy
 
 __all__ = ["base_of", "study_options", "teller"]
@@ -78,7 +78,7 @@ def base_of(study: NeighbourStudy, run: Path | None, out: Path, quiet: bool) -> 
     """
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
-    from pathwalker_cli.output.run_folder import load_run
+    from pathwalker_cli.results.run_folder import load_run
     from pathwalker_cli.studies.base import base_config, base_run
 
     if run is None:

@@ -12,7 +12,7 @@ from pathwalker_cli.commands.kinds import meant_as
 from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
 
 if TYPE_CHECKING:
-    from pathwalker_cli.output.run_folder import Run
+    from pathwalker_cli.results.run_folder import Run
     from pathwalker_cli.studies.base import NeighbourStudy
 
 __all__ = ["base_with_springs", "perturb_command"]

@@ -13,8 +13,8 @@ from rich.text import Text
 from pathwalker_cli.studies.run import RunLog
 
 if TYPE_CHECKING:
-    from pathwalker_cli.ocp.ipopt import ProgressReport
-    from pathwalker_cli.ocp.solution import LocalOptimum
+    from pathwalker_cli.gait.solution import LocalOptimum
+    from pathwalker_cli.nlp.ipopt import ProgressReport
 
 __all__ = ["Progress"]
 

@@ -57,8 +57,8 @@ def import_command(
     by the problems that start from recorded gait.
     """
     from pathwalker_cli.inverse.evaluate import kinematics_trials
+    from pathwalker_cli.inverse.recorded_files import write_trial
     from pathwalker_cli.inverse.study import Paths, RecordedConfig
-    from pathwalker_cli.output.recorded_files import write_trial
 
     def write(folder: Path, trials: Sequence[StudyTrial], who: Patient) -> _Findings:
         for trial in trials:
@@ -78,8 +78,8 @@ def import_command(
 def ik_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: bool) -> None:
     """Compute joint angles from the markers of the C3D files that CONFIG names."""
     from pathwalker_cli.inverse.evaluate import kinematics_trials
+    from pathwalker_cli.inverse.recorded_study import write_kinematics
     from pathwalker_cli.inverse.study import load_inverse_kinematics
-    from pathwalker_cli.output.recorded_study import write_kinematics
 
     def write(folder: Path, trials: Sequence[StudyTrial], patient: Patient) -> _Findings:
         write_kinematics(folder, trials, patient.body_mass)
@@ -115,18 +115,18 @@ def id_command(
     or added; everything else in it, comments too, stays as it is.
     """
     from pathwalker_cli.inverse.evaluate import dynamics_trials
+    from pathwalker_cli.inverse.patient_update import require_own_patient
+    from pathwalker_cli.inverse.recorded_study import write_dynamics, write_origin
+    from pathwalker_cli.inverse.recorded_text import (
+        dynamics_content,
+        residuals_renderable,
+        strengths_renderable,
+    )
     from pathwalker_cli.inverse.study import load_inverse_dynamics
     from pathwalker_cli.inverse.study_tables import (
         residual_tables,
         strength_table,
         study_warnings,
-    )
-    from pathwalker_cli.output.patient_update import require_own_patient
-    from pathwalker_cli.output.recorded_study import write_dynamics, write_origin
-    from pathwalker_cli.output.recorded_text import (
-        dynamics_content,
-        residuals_renderable,
-        strengths_renderable,
     )
     from pathwalker_cli.patient import load_patient
 
@@ -152,12 +152,12 @@ def _updated(
     patient: Patient, trials: Sequence[StudyTrial], table: StrengthTable, method: str
 ) -> str:
     """Put what was found into the patient's file; return a sentence about it."""
-    from pathwalker_cli.output.patient_update import (
+    from pathwalker_cli.inverse.patient_update import (
         recorded_blocks,
         require_own_patient,
         update_patient,
     )
-    from pathwalker_cli.output.recorded_study import strengths_source
+    from pathwalker_cli.inverse.recorded_study import strengths_source
 
     path, blocks = require_own_patient(patient), recorded_blocks(patient, trials)
     update_patient(path, table.strengths, strengths_source(method), blocks)
@@ -194,8 +194,8 @@ def _study(
     """
     from rich.console import Console
 
-    from pathwalker_cli.output.recorded_files import staged_folder
-    from pathwalker_cli.output.recorded_text import stance_notes, trial_warnings, trials_renderable
+    from pathwalker_cli.inverse.recorded_files import staged_folder
+    from pathwalker_cli.inverse.recorded_text import stance_notes, trial_warnings, trials_renderable
     from pathwalker_cli.patient import load_patient
 
     patient = load_patient(config.patient)

@@ -15,7 +15,7 @@ from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.io.yaml_file import KeyPath, Lines, read_mapping, validate
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import Patient, load_patient
-from pathwalker_cli.variation import varied
+from pathwalker_cli.patient.variation import varied
 
 __all__ = [
     "config_content",

@@ -10,12 +10,12 @@ from pydantic import AfterValidator, BeforeValidator, Field, field_validator, mo
 from pathwalker_cli.config.nested import merged
 from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, Condition
 from pathwalker_cli.errors import did_you_mean
-from pathwalker_cli.goals import COMFORT_COORDINATES, GOALS, Goals
+from pathwalker_cli.gait.goals import COMFORT_COORDINATES, GOALS, Goals
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.patient_blocks import Stiffness
+from pathwalker_cli.patient.blocks import Stiffness
+from pathwalker_cli.patient.variation import Variation
 from pathwalker_cli.problems import PROBLEMS
-from pathwalker_cli.variation import Variation
 
 __all__ = [
     "BoundsConfig",

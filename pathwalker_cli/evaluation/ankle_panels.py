@@ -11,7 +11,7 @@ from pathwalker_cli.conventions import Side, to_degrees
 from pathwalker_cli.evaluation.ankle import ankle_line, ankle_profile, recorded_ankle_profiles
 from pathwalker_cli.evaluation.cycle_curves import FINE
 from pathwalker_cli.evaluation.traces import Trace
-from pathwalker_cli.output.figures.style import NEUTRAL, TEXT, zero_line
+from pathwalker_cli.stride.figures.style import NEUTRAL, TEXT, zero_line
 
 __all__ = ["draw_ankle"]
 

@@ -25,8 +25,8 @@ from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.traces import Trace
 from pathwalker_cli.inverse.bands import POINTS
-from pathwalker_cli.output.figures.curves import CLINICAL_ANGLE, EXTENSION, Band
-from pathwalker_cli.output.figures.style import dress, percent_axis, zero_line
+from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION, Band
+from pathwalker_cli.stride.figures.style import dress, percent_axis, zero_line
 
 __all__ = [
     "ACTIVATIONS",

@@ -26,7 +26,7 @@ from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
 from pathwalker_cli.evaluation.reference import ReferenceStride, reference_stride
 from pathwalker_cli.evaluation.spread import Position, Spread
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.output.cycle import BOTH_SIDES
+from pathwalker_cli.stride.cycle import BOTH_SIDES
 
 Value = TypeVar("Value")
 

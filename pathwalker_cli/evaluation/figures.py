@@ -25,9 +25,9 @@ from pathwalker_cli.evaluation.cycle_curves import (
     known_curves,
 )
 from pathwalker_cli.evaluation.traces import Trace
-from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.figures.save import save_formats
-from pathwalker_cli.output.figures.style import (
+from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.figures.save import save_formats
+from pathwalker_cli.stride.figures.style import (
     NEUTRAL,
     STYLE,
     dress,

@@ -11,7 +11,7 @@ from pathwalker_cli.conventions import Side
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.spread import Spread, spread
-from pathwalker_cli.output.cycle import BOTH_SIDES
+from pathwalker_cli.stride.cycle import BOTH_SIDES
 
 __all__ = ["FORCE_RMS", "Span", "force_rms", "recorded_force_rms"]
 

@@ -13,8 +13,8 @@ from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
 from pathwalker_cli.inverse.bands import POINTS
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.output.cycle import STRIKE_PHASE, TOE_OFF_PHASE
-from pathwalker_cli.output.feet import point_rows
+from pathwalker_cli.stride.cycle import STRIKE_PHASE, TOE_OFF_PHASE
+from pathwalker_cli.stride.feet import point_rows
 
 __all__ = ["Gait"]
 

@@ -15,7 +15,7 @@ from pathwalker_cli.inverse.cycles import GaitCycle, step_lengths, walking_speed
 from pathwalker_cli.inverse.filters import frame_rate
 from pathwalker_cli.inverse.forces import foot_extents
 from pathwalker_cli.io.c3d import Event
-from pathwalker_cli.output.cycle import BOTH_SIDES
+from pathwalker_cli.stride.cycle import BOTH_SIDES
 
 __all__ = ["gait_numbers", "recorded_numbers"]
 

@@ -14,9 +14,9 @@ from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.ocp.series import GaitSeries, gait_series
-from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.run_folder import Run, load_run
+from pathwalker_cli.results.run_folder import Run, load_run
+from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.series import GaitSeries, gait_series
 
 __all__ = [
     "gait_of_run",

@@ -9,7 +9,7 @@ from typing import Any, Final
 from pathwalker_cli.conventions import Side
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.recorded import RecordedGait
-from pathwalker_cli.output.figures.style import LINE_COLOUR, LINE_STYLE, NEUTRAL
+from pathwalker_cli.stride.figures.style import LINE_COLOUR, LINE_STYLE, NEUTRAL
 
 __all__ = ["Trace", "lone_trace", "traces"]
 

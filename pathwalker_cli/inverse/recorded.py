@@ -15,7 +15,7 @@ from pathwalker_cli.inverse.forces import foot_extents
 from pathwalker_cli.io.recordings import CompactRecording
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient_blocks import Recorded
+from pathwalker_cli.patient.blocks import Recorded
 
 __all__ = ["recorded"]
 

@@ -28,7 +28,7 @@ from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.c3d import Event
 from pathwalker_cli.model.muscle import generators
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient_blocks import Strengths
+from pathwalker_cli.patient.blocks import Strengths
 
 __all__ = [
     "PARTS",

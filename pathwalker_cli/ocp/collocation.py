@@ -9,9 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
-from pathwalker_cli.ocp.blocks import BlockProgram, Occurrences
+from pathwalker_cli.nlp.blocks import BlockProgram, Occurrences
+from pathwalker_cli.nlp.elimination import Elimination, elimination_of
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
-from pathwalker_cli.ocp.elimination import Elimination, elimination_of
 from pathwalker_cli.ocp.layout import Layout
 from pathwalker_cli.ocp.phased import (
     PhasedMotion,

@@ -13,11 +13,11 @@ from functools import partial
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.ocp.blocks import Block, KeptBlock
-from pathwalker_cli.ocp.frozen import FrozenTerms
+from pathwalker_cli.nlp.blocks import Block, KeptBlock
+from pathwalker_cli.nlp.frozen import FrozenTerms
+from pathwalker_cli.nlp.tape import Tape
 from pathwalker_cli.ocp.phased import collocation_times, lagrange_weights, quadrature_weights
 from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase
-from pathwalker_cli.ocp.tape import Tape
 from pathwalker_cli.ocp.unknowns import Unknown, boundary_block
 
 __all__ = ["CollocationBlocks"]

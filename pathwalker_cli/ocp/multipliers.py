@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import quadrature_weights
 
 __all__ = ["transferred"]

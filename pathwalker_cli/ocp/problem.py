@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.ocp.frozen import FrozenTerms
+from pathwalker_cli.nlp.frozen import FrozenTerms
 
 __all__ = [
     "BoundTable",

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pathwalker_cli.ocp.blocks import Block, BlockProgram, Occurrences
+from pathwalker_cli.nlp.blocks import Block, BlockProgram, Occurrences
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import INFINITY, ProblemNumbers, Rows
 from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks

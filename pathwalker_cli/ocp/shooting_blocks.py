@@ -25,8 +25,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.ocp.blocks import Block
-from pathwalker_cli.ocp.frozen import FrozenTerms
+from pathwalker_cli.nlp.blocks import Block
+from pathwalker_cli.nlp.frozen import FrozenTerms
 from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Rows, Variables
 from pathwalker_cli.ocp.shooting_steps import CASH_KARP
 from pathwalker_cli.ocp.unknowns import Unknown, boundary_block

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.ocp.blocks import Block
+from pathwalker_cli.nlp.blocks import Block
 from pathwalker_cli.ocp.problem import MultiPhaseProblem, Variables
 
 __all__ = ["PlaceBook", "Unknown", "boundary_block"]

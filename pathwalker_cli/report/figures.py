@@ -18,13 +18,13 @@ from pathwalker_cli.evaluation.cycle_curves import (
 from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_handles
 from pathwalker_cli.evaluation.traces import Trace, lone_trace, traces
 from pathwalker_cli.inverse.evaluate import StudyTrial
-from pathwalker_cli.output.figures.inline import inline_svg
-from pathwalker_cli.output.figures.style import STYLE, legend, new_figure
-from pathwalker_cli.output.recorded_figures import joint_torque_figure, name_figure
-from pathwalker_cli.patient_blocks import SpringSet
+from pathwalker_cli.inverse.recorded_figures import joint_torque_figure, name_figure
+from pathwalker_cli.patient.blocks import SpringSet
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.study_files import Spreads
+from pathwalker_cli.stride.figures.inline import inline_svg
+from pathwalker_cli.stride.figures.style import STYLE, legend, new_figure
 from pathwalker_cli.studies.landscape.figures import Chosen, cost_figure
 from pathwalker_cli.studies.landscape.result import Landscape
 from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure

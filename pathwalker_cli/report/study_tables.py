@@ -9,13 +9,13 @@ import numpy as np
 
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.report.content import Row, Section, Table
 from pathwalker_cli.report.figures import landscape_drawing, spread_drawing, tradeoff_drawing
 from pathwalker_cli.report.folders import Study
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.springs import recommended
 from pathwalker_cli.report.study_files import Spreads, landscape_of, spreads_of
+from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.studies.landscape.figures import Chosen
 from pathwalker_cli.studies.measures import COMPARED, MEASURES, measure_of
 from pathwalker_cli.studies.sensitivity.text import label_of

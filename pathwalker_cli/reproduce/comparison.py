@@ -15,11 +15,11 @@ from pathwalker_cli.evaluation.paper import NUMBERS, PaperNumber
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.spread import Spread
 from pathwalker_cli.inverse.bands import cycle_band
-from pathwalker_cli.output.cycle import BOTH_SIDES
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce.inverse_study import InverseResult
 from pathwalker_cli.reproduce.reasons import NOT_COMPUTED, reason_for
 from pathwalker_cli.reproduce.results import ProblemResult, Results
+from pathwalker_cli.stride.cycle import BOTH_SIDES
 
 __all__ = ["Ours", "Row", "all_rows", "number_rows"]
 

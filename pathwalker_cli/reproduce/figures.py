@@ -13,16 +13,16 @@ from matplotlib.figure import Figure
 
 from pathwalker_cli.evaluation.figures import ankle_figure, ground_force_figure, joint_angle_figure
 from pathwalker_cli.evaluation.traces import Trace, lone_trace
-from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.output.figures import orthosis_curves
-from pathwalker_cli.output.figures.save import save_formats
-from pathwalker_cli.output.figures.style import STYLE
 from pathwalker_cli.reproduce.muscle_figures import (
     activation_figure,
     curve_figure,
     muscle_torque_figure,
 )
 from pathwalker_cli.reproduce.results import ProblemResult, Results
+from pathwalker_cli.stride.figures import orthosis_curves
+from pathwalker_cli.stride.figures.save import save_formats
+from pathwalker_cli.stride.figures.style import STYLE
+from pathwalker_cli.stride.series import GaitSeries
 
 __all__ = ["save_paper_figures"]
 

@@ -12,10 +12,9 @@ from matplotlib.lines import Line2D
 
 from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SUFFIX, Side, to_degrees
 from pathwalker_cli.model.muscle import generators
-from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.output.cycle import BOTH_SIDES, own_cycle
-from pathwalker_cli.output.figures.curves import CLINICAL_ANGLE, EXTENSION
-from pathwalker_cli.output.figures.style import (
+from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
+from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION
+from pathwalker_cli.stride.figures.style import (
     NEUTRAL,
     dress,
     legend,
@@ -23,6 +22,7 @@ from pathwalker_cli.output.figures.style import (
     percent_axis,
     zero_line,
 )
+from pathwalker_cli.stride.series import GaitSeries
 
 __all__ = ["activation_figure", "curve_figure", "muscle_torque_figure"]
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.io.atomic import atomic_open
-from pathwalker_cli.output.versions import versions
 from pathwalker_cli.reproduce.figures import save_paper_figures
 from pathwalker_cli.reproduce.inverse_study import (
     METHODS,
@@ -22,6 +21,7 @@ from pathwalker_cli.reproduce.page import page_text
 from pathwalker_cli.reproduce.plan import check_folder, planned_studies
 from pathwalker_cli.reproduce.results import Results, evaluated, recordings
 from pathwalker_cli.studies.run import is_done
+from pathwalker_cli.versions import versions
 
 __all__ = ["PAGE", "Say", "Solve", "reproduce"]
 

@@ -7,7 +7,7 @@ from typing import Final
 
 from pathwalker_cli.config import StudyConfig, load_config, smoke_version
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.output.run_folder import check_target
+from pathwalker_cli.results.run_folder import check_target
 from pathwalker_cli.studies.base import check_folder as check_own_folder
 
 __all__ = ["ENTRIES", "ORDER", "SEVERAL", "check_folder", "planned_studies"]

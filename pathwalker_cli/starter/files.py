@@ -14,9 +14,9 @@ from pydantic import BaseModel
 
 from pathwalker_cli.io.described import described, field_at
 from pathwalker_cli.io.templates import templates
-from pathwalker_cli.model.proportions import ANKLE_HEIGHT, HEEL_SHARE, TOE_SHARE, default_length
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient_blocks import OrthosisData
+from pathwalker_cli.patient.blocks import OrthosisData
+from pathwalker_cli.patient.proportions import ANKLE_HEIGHT, HEEL_SHARE, TOE_SHARE, default_length
 from pathwalker_cli.starter.child import Child
 from pathwalker_cli.starter.comments import WIDTH, comment, commented, unbroken
 from pathwalker_cli.starter.configs import config_files

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import DataError, PatientError
-from pathwalker_cli.output.recorded_files import staged_folder
+from pathwalker_cli.inverse.recorded_files import staged_folder
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.starter.child import Child
 from pathwalker_cli.starter.files import folder_files

@@ -18,11 +18,11 @@ from pathwalker_cli.config import (
     with_values,
 )
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.io.atomic import check_room, sweep
 from pathwalker_cli.io.fields import YamlModel
 from pathwalker_cli.io.lock import locked
-from pathwalker_cli.ocp.resolve import Optimum, Resolver
-from pathwalker_cli.output.run_folder import Run, load_run
+from pathwalker_cli.results.run_folder import Run, load_run
 from pathwalker_cli.studies.run import RunLog, is_done, run_study
 
 __all__ = [

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
-from pathwalker_cli.ocp.resolve import Optimum
+from pathwalker_cli.gait.resolve import Optimum
 
 __all__ = ["Edge", "find_edge"]
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.io.atomic import atomic_open
-from pathwalker_cli.ocp.ipopt import Multipliers, NlpResult
-from pathwalker_cli.ocp.resolve import Optimum, Resolver
-from pathwalker_cli.output.motion_file import read_arrays
-from pathwalker_cli.output.run_folder import Run, config_text
-from pathwalker_cli.output.run_metrics import sha256
+from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
+from pathwalker_cli.results.motion_file import read_arrays
+from pathwalker_cli.results.run_folder import Run, config_text
+from pathwalker_cli.results.run_metrics import sha256
 
 __all__ = ["STOPPED", "Journal"]
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.conventions import STIFFNESSES, to_degrees
+from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.atomic import atomic_open
-from pathwalker_cli.ocp.resolve import Optimum
-from pathwalker_cli.output.metrics import gait_metrics
+from pathwalker_cli.stride.metrics import gait_metrics
 
 __all__ = [
     "COMPARED",

@@ -9,9 +9,9 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.ocp.cost_terms import walked_distance
-from pathwalker_cli.ocp.resolve import Optimum
-from pathwalker_cli.output.run_folder import Run
+from pathwalker_cli.gait.cost_terms import walked_distance
+from pathwalker_cli.gait.resolve import Optimum
+from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import require_optimum, resolver_of
 from pathwalker_cli.studies.graph import Solve, Values
 from pathwalker_cli.studies.journal import Journal

@@ -9,8 +9,8 @@ from typing import Final
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.ocp.processes import called_elsewhere, prepare_worker
-from pathwalker_cli.output.run_folder import load_run
+from pathwalker_cli.io.processes import called_elsewhere, prepare_worker
+from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.studies.base import resolver_of
 from pathwalker_cli.studies.journal import STOPPED, Journal
 from pathwalker_cli.studies.measures import measures

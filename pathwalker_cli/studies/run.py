@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 
 from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.errors import DataError, InputError
-from pathwalker_cli.ocp.ipopt import ProgressReport
-from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.output.run_folder import (
+from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.nlp.ipopt import ProgressReport
+from pathwalker_cli.patient import load_patient
+from pathwalker_cli.results.run_folder import (
     Run,
     check_target,
     config_text,
@@ -20,8 +21,7 @@ from pathwalker_cli.output.run_folder import (
     warm_start_run,
     write_run,
 )
-from pathwalker_cli.output.run_metrics import RunInputs, patient_hash, run_inputs
-from pathwalker_cli.patient import load_patient
+from pathwalker_cli.results.run_metrics import RunInputs, patient_hash, run_inputs
 from pathwalker_cli.studies.verdict import Verdict, verdict_of
 from pathwalker_cli.studies.verdict_text import verdict_lines
 
@@ -129,11 +129,11 @@ def _solve(study: StudyConfig, earlier: Run | None, log: RunLog) -> GaitSolution
     motion = None if earlier is None else earlier.motion
     # what few solves need is loaded where it is needed: the others begin 0.4 s sooner
     if study.transcription == "multiple-shooting":
-        from pathwalker_cli.ocp.by_shooting import solve_by_shooting
+        from pathwalker_cli.gait.by_shooting import solve_by_shooting
 
         return solve_by_shooting(GaitSolver(study, log), motion)
     if study.starts > 1 and motion is None:
-        from pathwalker_cli.ocp.starts import solve_from_starts
+        from pathwalker_cli.gait.starts import solve_from_starts
 
         return solve_from_starts(study, log.optimum)
     return GaitSolver(study, log).solve(motion)

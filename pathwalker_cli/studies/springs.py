@@ -8,8 +8,8 @@ from typing import Final, Literal
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.ocp.resolve import Optimum
-from pathwalker_cli.output.text import active_bounds
+from pathwalker_cli.gait.resolve import Optimum
+from pathwalker_cli.results.text import active_bounds
 from pathwalker_cli.studies.measures import measure_of
 
 __all__ = ["Ranges", "Spring", "ends", "free_springs", "require_springs", "spring_ranges"]

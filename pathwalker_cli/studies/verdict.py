@@ -15,13 +15,13 @@ from pydantic import TypeAdapter, ValidationError
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.gait.neighbourhood import Neighbourhood
+from pathwalker_cli.gait.resolve import Optimum, Resolver
+from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.io.refusals import dotted
 from pathwalker_cli.model.walker import ANKLES
-from pathwalker_cli.ocp.neighbourhood import Neighbourhood
-from pathwalker_cli.ocp.resolve import Optimum, Resolver
-from pathwalker_cli.ocp.series import GaitSeries
-from pathwalker_cli.ocp.solution import GaitSolution, LocalOptimum
-from pathwalker_cli.patient_blocks import RealSpring
+from pathwalker_cli.patient.blocks import RealSpring
+from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.studies.edges import Edge, find_edge
 from pathwalker_cli.studies.springs import ends, spring_ranges
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pathwalker_cli.output.run_folder import Run
+from pathwalker_cli.results.run_folder import Run
 
 __all__ = ["difference_lines"]
 

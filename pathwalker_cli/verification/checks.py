@@ -13,20 +13,20 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.gait.cost_terms import cost_terms
+from pathwalker_cli.gait.goal_costs import goal_values
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.special import refuse_special
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.ocp.balance import balance
+from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.cost_terms import cost_terms
-from pathwalker_cli.ocp.goal_costs import goal_values
-from pathwalker_cli.ocp.optimality import optimality
-from pathwalker_cli.ocp.series import GaitSeries, gait_series
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.ocp.verify import equation_residual, reintegrate, second_engine_residual
-from pathwalker_cli.output.metrics import GaitMetrics, gait_metrics
-from pathwalker_cli.output.run_folder import CONFIG, PATIENT, Run, load_run, repeatable_config
-from pathwalker_cli.output.run_metrics import METRICS_HASH, metrics_hash, sha256
-from pathwalker_cli.output.tables import TABLES
+from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run, repeatable_config
+from pathwalker_cli.results.run_metrics import METRICS_HASH, metrics_hash, sha256
+from pathwalker_cli.results.tables import TABLES
+from pathwalker_cli.stride.balance import balance
+from pathwalker_cli.stride.metrics import GaitMetrics, gait_metrics
+from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.verify import equation_residual, reintegrate, second_engine_residual
 
 __all__ = ["Check", "Verification", "verify_run"]
 

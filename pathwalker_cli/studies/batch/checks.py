@@ -6,14 +6,14 @@ from pathlib import Path
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import ConfigError, InputError, PatientError, placed
+from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.passage import recorded_passage
+from pathwalker_cli.gait.start import recorded_stride, start_recording
+from pathwalker_cli.gait.symmetry import require_symmetry
 from pathwalker_cli.model.walker import Walker, build_walker
-from pathwalker_cli.ocp.gait_bounds import gait_bounds
-from pathwalker_cli.ocp.passage import recorded_passage
-from pathwalker_cli.ocp.start import recorded_stride, start_recording
-from pathwalker_cli.ocp.symmetry import require_symmetry
-from pathwalker_cli.output.run_folder import warm_start_run
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.variation import varied
+from pathwalker_cli.patient.variation import varied
+from pathwalker_cli.results.run_folder import warm_start_run
 
 __all__ = ["check_case", "check_patient", "check_warm_start"]
 

@@ -12,8 +12,8 @@ from typing import Final
 
 from pebble import ProcessExpired, ProcessPool
 
-from pathwalker_cli.ocp.machine import use_one_blas_thread
-from pathwalker_cli.ocp.processes import deaf, prepare_worker
+from pathwalker_cli.io.processes import deaf, prepare_worker
+from pathwalker_cli.nlp.machine import use_one_blas_thread
 from pathwalker_cli.studies.batch.worker import LOST, Result, Task, Work, failure
 
 __all__ = ["LocalPool"]

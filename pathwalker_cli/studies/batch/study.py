@@ -9,7 +9,7 @@ from pathlib import Path
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.io.atomic import sweep
 from pathwalker_cli.io.lock import locked
-from pathwalker_cli.output.run_folder import release_runs
+from pathwalker_cli.results.run_folder import release_runs
 from pathwalker_cli.studies.base import check_folder
 from pathwalker_cli.studies.batch.cases import Case
 from pathwalker_cli.studies.batch.ledger import CASES, ENTRIES, Ended, Ledger

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.io.atomic import atomic_open
-from pathwalker_cli.output.tables import DIGITS
+from pathwalker_cli.results.tables import DIGITS
 from pathwalker_cli.studies.batch.cases import Case
 from pathwalker_cli.studies.batch.units import unit_of
 

@@ -99,7 +99,7 @@ def _solved(config: str, folder: str, warm_start: str) -> Result:
     """Solve a case; heavy libraries are loaded here, where they are needed."""
     try:
         from pathwalker_cli.config import StudyConfig
-        from pathwalker_cli.output.run_folder import claimed_run
+        from pathwalker_cli.results.run_folder import claimed_run
         from pathwalker_cli.studies.run import is_done, run_study
 
         study = StudyConfig.model_validate_json(config, strict=True)

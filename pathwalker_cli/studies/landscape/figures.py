@@ -18,9 +18,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLo
 
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
-from pathwalker_cli.output.figures.save import save_formats
-from pathwalker_cli.output.figures.style import STYLE, legend, legend_panel, new_figure
-from pathwalker_cli.patient_blocks import SpringSet
+from pathwalker_cli.patient.blocks import SpringSet
+from pathwalker_cli.stride.figures.save import save_formats
+from pathwalker_cli.stride.figures.style import STYLE, legend, legend_panel, new_figure
 from pathwalker_cli.studies.landscape.result import Landscape
 from pathwalker_cli.studies.measures import measure_of
 

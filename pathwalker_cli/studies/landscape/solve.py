@@ -12,9 +12,9 @@ import numpy as np
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.ocp.ipopt import NlpResult
-from pathwalker_cli.ocp.resolve import Optimum
-from pathwalker_cli.output.run_folder import Run
+from pathwalker_cli.gait.resolve import Optimum
+from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.branches import explore
 from pathwalker_cli.studies.graph import Exploration, Graph, Rules, Values
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point

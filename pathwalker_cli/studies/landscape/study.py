@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
-from pathwalker_cli.patient_blocks import Stiffness
+from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.studies.base import NeighbourStudy
 
 __all__ = ["Axis", "LandscapeStudy", "axis_values"]

@@ -16,9 +16,9 @@ from pydantic import Field, field_validator
 
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.fields import Quantity, invalid
-from pathwalker_cli.ocp.resolve import Optimum
-from pathwalker_cli.output.run_folder import Run
+from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import NeighbourStudy, require_optimum, resolver_of
 from pathwalker_cli.studies.journal import Journal
 from pathwalker_cli.studies.measures import measures

@@ -13,12 +13,12 @@ from typing import Annotated, Any, Final
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import ConfigError, NotConvergedError
+from pathwalker_cli.gait.neighbourhood import Derivative, Neighbourhood
+from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.fields import Quantity
-from pathwalker_cli.ocp.neighbourhood import Derivative, Neighbourhood
-from pathwalker_cli.ocp.resolve import Optimum
-from pathwalker_cli.output.run_folder import Run
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient_blocks import SegmentLengths, Strengths
+from pathwalker_cli.patient.blocks import SegmentLengths, Strengths
+from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import NeighbourStudy, require_optimum, resolver_of
 from pathwalker_cli.studies.journal import Journal
 from pathwalker_cli.studies.measures import all_measures, measures

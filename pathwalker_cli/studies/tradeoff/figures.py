@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pathwalker_cli.conventions import STIFFNESSES, Side
-from pathwalker_cli.output.figures.save import save_formats
-from pathwalker_cli.output.figures.style import (
+from pathwalker_cli.stride.figures.save import save_formats
+from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
     NEUTRAL,

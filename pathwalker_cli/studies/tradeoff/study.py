@@ -13,10 +13,10 @@ from pydantic import Field, field_validator
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.config.schema import Weight
 from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.gait.resolve import Optimum
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.fields import AS_TUPLE, invalid
-from pathwalker_cli.ocp.resolve import Optimum
-from pathwalker_cli.ocp.solve import GaitSolver
-from pathwalker_cli.output.run_folder import Run, load_run, write_run
+from pathwalker_cli.results.run_folder import Run, load_run, write_run
 from pathwalker_cli.studies.base import NeighbourStudy
 from pathwalker_cli.studies.branches import explore
 from pathwalker_cli.studies.graph import Exploration, Graph, Rules, Values

@@ -18,7 +18,7 @@ from scipy.stats import qmc
 from pathwalker_cli.errors import ConfigError, InputError
 from pathwalker_cli.io.fields import Quantity, YamlModel, invalid
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.variation import Variation, varied
+from pathwalker_cli.patient.variation import Variation, varied
 
 __all__ = ["Distribution", "Draws", "Input", "draw", "inputs_of"]
 

@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.output.cycle import BOTH_SIDES
-from pathwalker_cli.output.figures.save import save_formats
-from pathwalker_cli.output.figures.style import (
+from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.figures.save import save_formats
+from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
     MARKER,
     NEUTRAL,

@@ -12,8 +12,8 @@ from pydantic import Field
 from pathwalker_cli.config import StudyConfig, study_patient, with_values
 from pathwalker_cli.errors import InputError, PatientError
 from pathwalker_cli.io.fields import Quantity
-from pathwalker_cli.output.run_folder import Run
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import NeighbourStudy, require_optimum, resolver_of
 from pathwalker_cli.studies.measures import measures
 from pathwalker_cli.studies.pool import Job, Solved, solve_jobs

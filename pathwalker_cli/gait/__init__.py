@@ -1,0 +1,1 @@
+"""Walking as an optimal control problem: posed, begun, solved, varied."""

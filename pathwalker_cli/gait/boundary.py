@@ -1,0 +1,107 @@
+"""What ties the ends of a gait together, and what is minimised: equations (8), (9) and (10)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Final
+
+import casadi as ca
+import numpy as np
+
+from pathwalker_cli.conventions import mirror_permutation
+from pathwalker_cli.gait.goals import Goals
+from pathwalker_cli.ocp.problem import INFINITY, Boundary, Instant, Rows, Variables
+
+__all__ = ["PER_DISTANCE", "gait_boundary"]
+
+PER_DISTANCE: Final = ("effort", "rate", "acceleration")
+"""Running costs that are divided by the distance."""
+
+Groups = tuple[Variables, Variables, Variables]
+
+
+def gait_boundary(
+    groups: Groups,
+    parameters: Variables,
+    integrals: Sequence[str],
+    weights: Mapping[str, ca.SX],
+    goals: Goals,
+    phases: int,
+    mirrored: bool,
+    start: Rows | None = None,
+) -> Boundary:
+    """Return boundary rows and objective of a gait.
+
+    Args:
+        groups: States (pelvis_tx first), activations and their rates.
+        parameters: Free parameters; of a mirrored gait left and right are equal.
+        integrals: Names of the running costs.
+        weights: Weight of every cost term by name.
+        goals: Clinical goals.
+        phases: Number of phases.
+        mirrored: Whether the phases are one step and the other is its mirror image.
+        start: Rows in the first instant's states (the symbol of `groups[0]`) of a passage that
+            is not periodic; None for a periodic gait.
+    """
+    first, last = _instant(groups, "first"), _instant(groups, "last")
+    durations = ca.SX.sym("durations", phases)
+    totals = ca.SX.sym("integrals", len(integrals))
+    steps = 2 if mirrored else 1  # distance, time and costs are those of a whole stride
+    distance = steps * (last[0][0] - first[0][0])
+    time = steps * ca.sum1(durations)
+    free = Rows.make(
+        ca.vertcat(distance, distance / time),
+        ("distance", "walking_speed"),
+        1.0,
+        -INFINITY,
+        INFINITY,
+    )
+    if start is None:
+        ends = _periodicity(groups, first, last, mirrored)
+    else:
+        ends = [_at_first(start, groups[0], first[0])]
+    rows = Rows.join(*ends, *([_symmetry(parameters)] if mirrored else []), free)
+    total = dict(zip(integrals, ca.vertsplit(steps * totals), strict=True))
+    objective = sum(weights[name] * total[name] for name in PER_DISTANCE) / distance
+    objective += weights["tracking"] * total["tracking"]
+    objective += weights["reserve"] * total["reserve"]
+    objective += weights["smoothing"] * (total["effort"] + total["rate"])
+    objective -= weights["walking_speed"] * distance / time
+    for name, value in goals.values(total, distance, time, ca.vertsplit(durations)).items():
+        objective += weights[name] * value
+    if "excitation" in total:
+        objective += weights["excitation"] * total["excitation"]
+    return Boundary(first, last, durations, totals, rows, objective)
+
+
+def _instant(groups: Groups, label: str) -> Instant:
+    """Return fresh symbols for x, y and u at one instant."""
+    x, y, u = (ca.SX.sym(f"{label}{i}", group.size) for i, group in enumerate(groups))
+    return x, y, u
+
+
+def _symmetry(parameters: Variables) -> Rows:
+    """Return the rows that let left and right parameters be equal."""
+    order = mirror_permutation(parameters.names)
+    pairs = [(i, int(k)) for i, k in enumerate(order) if i < k]
+    p, names = parameters.symbol, parameters.names
+    difference = ca.vertcat(*(p[i] - p[k] for i, k in pairs))
+    scale = np.array([parameters.scale[i] for i, _ in pairs])
+    return Rows.make(difference, tuple(f"{names[i]} symmetry" for i, _ in pairs), scale)
+
+
+def _at_first(rows: Rows, states: Variables, first: ca.SX) -> Rows:
+    """Return rows in the states as rows in the states of the first instant."""
+    (value,) = ca.substitute([rows.value], [states.symbol], [first])
+    return replace(rows, value=value)
+
+
+def _periodicity(groups: Groups, first: Instant, last: Instant, mirrored: bool) -> list[Rows]:
+    """Return the rows that let the last instant be the first one, left and right exchanged."""
+    result = []
+    for a, b, group, skip in zip(first, last, groups, (1, 0, 0), strict=True):
+        order = mirror_permutation(group.names) if mirrored else np.arange(group.size)
+        names = tuple(f"{name} periodicity" for name in group.names[skip:])
+        result.append(Rows.make((b - a[order.tolist()])[skip:], names, group.scale[skip:]))
+    return result

@@ -1,0 +1,67 @@
+"""Mesh intervals: as many as the duration of a phase asks for, more where they are inaccurate."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pathwalker_cli.config import MeshConfig
+from pathwalker_cli.stride.verify import Reintegration
+
+__all__ = ["by_duration", "first", "refined", "uniform"]
+
+
+def uniform(counts: np.ndarray | list[int]) -> tuple[np.ndarray, ...]:
+    """Return equally spaced nodes in [0, 1], one array per phase."""
+    return tuple(np.linspace(0.0, 1.0, int(count) + 1) for count in counts)
+
+
+def first(durations: np.ndarray, config: MeshConfig) -> tuple[np.ndarray, ...]:
+    """Return the mesh that a config begins with, for phases of these durations [s]."""
+    if isinstance(config.intervals, tuple):
+        return uniform(list(config.intervals[: len(durations)]))
+    return by_duration(durations, config.intervals, config.least_intervals_per_phase)
+
+
+def by_duration(
+    durations: np.ndarray, intervals: int, least_per_phase: int
+) -> tuple[np.ndarray, ...]:
+    """Return a mesh of about equally long intervals.
+
+    Args:
+        durations: Phase durations [s].
+        intervals: Number of intervals over all phases; short phases may bring in a few more.
+        least_per_phase: Fewest intervals in a phase.
+    """
+    shares = intervals * np.asarray(durations) / np.sum(durations)
+    return uniform(np.maximum(np.ceil(shares), least_per_phase).astype(int).tolist())
+
+
+def refined(
+    meshes: tuple[np.ndarray, ...],
+    errors: Reintegration,
+    position_tolerance: float,
+    velocity_tolerance: float,
+    order: int,
+    share: float = 1.0,
+) -> tuple[np.ndarray, ...]:
+    """Return a mesh in which intervals that miss the tolerances are split.
+
+    Args:
+        meshes: The mesh that was used.
+        errors: Errors on it.
+        position_tolerance: Error of q to stay below [rad, m].
+        velocity_tolerance: Error of v to stay below [rad/s, m/s].
+        order: Order of the error in the length of an interval.
+        share: Share of the tolerances above which an interval is split.
+    """
+    result = []
+    for mesh, position, velocity in zip(meshes, errors.position, errors.velocity, strict=True):
+        ratio = np.maximum(position / position_tolerance, velocity / velocity_tolerance)
+        # half the tolerance is aimed at: the next solution moves a little
+        parts = np.ceil(np.clip(2.0 * ratio, 1e-9, 1e6) ** (1.0 / order))
+        parts = np.where(ratio > share, np.clip(parts, 2, 4), 1).astype(int)
+        pieces = [
+            np.linspace(mesh[i], mesh[i + 1], n + 1)[:-1] for i, n in enumerate(parts.tolist())
+        ]
+        result.append(np.concatenate([*pieces, [1.0]]))
+    return tuple(result)

@@ -1,0 +1,226 @@
+"""Solve neighbours of a solved problem: same structure and mesh, other numbers, warm start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.gait.solution import GaitSolution
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.gait.symmetry import full_stride
+from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult, NlpSolver, warm_pushes
+from pathwalker_cli.nlp.kkt import KktSystem
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.verify import Reintegration, reintegrate
+
+__all__ = ["Optimum", "Resolver", "WarmStart", "warm_start_for"]
+
+_WATCHDOG: Final = {"watchdog_shortened_iter_trigger": 1, "watchdog_trial_iter_max": 30}
+"""A neighbour further off is reached by full steps that the filter alone would cut to nothing."""
+
+_WARM_ITERATIONS: Final = 150
+"""Iterations after which a warm start is given up; most take about ten, far ones about fifty."""
+
+
+@dataclass(frozen=True)
+class WarmStart:
+    """How to begin with the multipliers of a neighbour.
+
+    Args:
+        barrier: First barrier parameter; None for a tenth of the tolerance.
+        push: How far the start is moved off its bounds [solver units]; None for IPOPT's settings.
+    """
+
+    barrier: float | None = None
+    push: float | None = None
+
+
+# The further a neighbour, the more bounds become active or inactive on the way to it, and from
+# close to the bounds steps are cut to a few per cent for dozens of iterations.
+_NEAR: Final = WarmStart()
+_FURTHER: Final = WarmStart(1e-6, 3e-4)
+_FAR: Final = WarmStart(1e-5, 1e-2)
+_NEAR_ROWS: Final = 2e-3
+"""Largest root mean square violation of rows [solver units] by the start of a near neighbour."""
+_FURTHER_ROWS: Final = 1e-2
+"""The same for one further off: strengths that vary by 10 % reach 7e-3; masses and lengths, which
+need another start, begin at 1.5e-2."""
+_NEAR_BOUNDS: Final = 0.2
+"""Largest violation of a bound [solver units] by the start of a near one; 5 % of a spring: 0.1."""
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """A solved neighbour.
+
+    Args:
+        solver: The solver of its config; it brings in walker, bounds and numbers.
+        program: The nonlinear program.
+        result: How the solve of it ended.
+    """
+
+    solver: GaitSolver
+    program: CollocationProgram
+    result: NlpResult
+
+    @property
+    def config(self) -> StudyConfig:
+        """What was asked for."""
+        return self.solver.config
+
+    @property
+    def converged(self) -> bool:
+        """Whether the tolerances were met."""
+        return self.result.converged
+
+    @property
+    def cost(self) -> float:
+        """Value of the objective."""
+        return self.result.objective
+
+    @cached_property
+    def motion(self) -> PhasedMotion:
+        """The motion of a whole stride."""
+        motion = self.program.to_motion(self.result.unknowns)
+        return full_stride(motion) if self.config.half_cycle else motion
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """K_D right, left, K_P right, left [N m/rad], shape (4,); empty when barefoot."""
+        return self.motion.parameters
+
+    @cached_property
+    def series(self) -> GaitSeries:
+        """Time series of the stride."""
+        return gait_series(self.solver.walker, self.motion)
+
+    @cached_property
+    def reintegration(self) -> Reintegration:
+        """Errors of an independent integrator: the mesh was made for another problem."""
+        return reintegrate(self.solver.walker, self.motion)
+
+    @cached_property
+    def kkt(self) -> KktSystem:
+        """The KKT system at this optimum."""
+        return KktSystem(self.program, self.result)
+
+    @property
+    def solution(self) -> GaitSolution:
+        """The same as the end of a solve, e.g. for a run folder."""
+        return self.solver.restored(self.result, self.program.meshes)
+
+
+class Resolver:
+    """Solves problems near an optimum on its mesh; derivatives and solver are built once.
+
+    Args:
+        config: The config of the optimum.
+        motion: Its motion.
+        multipliers: Its multipliers; without them the optimum is solved anew from its motion.
+        tolerance: Optimality tolerance of all solves; that of the config if left out.
+    """
+
+    def __init__(
+        self,
+        config: StudyConfig,
+        motion: PhasedMotion,
+        multipliers: Multipliers | None = None,
+        tolerance: float | None = None,
+    ) -> None:
+        self._solver = GaitSolver(config)
+        self._tolerance = tolerance or config.solver.tolerance
+        steps = motion.phases[: len(self._solver.gait.phases)]
+        self._motion = replace(motion, phases=steps)
+        self._program = self._program_of(self._solver)
+        self._warm_solvers: dict[WarmStart, NlpSolver] = {}
+        self._multipliers = multipliers
+        if multipliers is not None and multipliers.rows.size != self._program.program.rows:
+            self._multipliers = None
+
+    @classmethod
+    def at(cls, optimum: Optimum, tolerance: float | None = None) -> Resolver:
+        """Return a solver of the neighbours of an optimum."""
+        return cls(optimum.config, optimum.motion, optimum.result.multipliers, tolerance)
+
+    @cached_property
+    def optimum(self) -> Optimum:
+        """The optimum itself, solved to the tolerance."""
+        start = self._program.to_unknowns(self._motion)
+        result = (
+            self._warm(_NEAR).solve(self._program, start, self._multipliers)
+            if self._multipliers is not None
+            else self._cold.solve(self._program, start)
+        )
+        return Optimum(self._solver, self._program, result)
+
+    def resolve(
+        self, config: StudyConfig, start: Optimum | None = None, insist: bool = True
+    ) -> Optimum:
+        """Solve a neighbour.
+
+        Args:
+            config: What differs; problem, model and degree must be those of the optimum.
+            start: Neighbour to begin with; the optimum if left out.
+            insist: Whether to try without multipliers, which may take long, where these do not
+                lead to a solution.
+
+        Returns:
+            Where the solve ended, converged or not.
+        """
+        start = start or self.optimum
+        solver = GaitSolver(config)
+        program = self._program_of(solver)
+        unknowns, multipliers = start.result.unknowns, start.result.multipliers
+        result = self._warm(warm_start_for(program, unknowns)).solve(program, unknowns, multipliers)
+        if insist and not result.converged and result.status != "stopped by the user":
+            result = self._cold.solve(program, unknowns)
+        return Optimum(solver, program, result)
+
+    def restored(self, config: StudyConfig, result: NlpResult) -> Optimum:
+        """Return a neighbour that was solved before."""
+        solver = GaitSolver(config)
+        return Optimum(solver, self._program_of(solver), result)
+
+    def _program_of(self, solver: GaitSolver) -> CollocationProgram:
+        return CollocationProgram(solver.blocks, solver.prediction, self._motion.meshes)
+
+    def _warm(self, start: WarmStart) -> NlpSolver:
+        """Return the solver that begins with multipliers in this way."""
+        if start not in self._warm_solvers:
+            solver = self._solver.config.solver
+            lowest = min(solver.refined_barrier, 0.1 * self._tolerance)
+            settings = self._solver.settings(self._tolerance, start.barrier or lowest, warm=True)
+            pushes = {} if start.push is None else warm_pushes(start.push)
+            extra = {**_WATCHDOG, **pushes, **settings.extra}
+            settings = replace(settings, max_iterations=_WARM_ITERATIONS, extra=extra)
+            self._warm_solvers[start] = NlpSolver(self._program, settings)
+        return self._warm_solvers[start]
+
+    @cached_property
+    def _cold(self) -> NlpSolver:
+        """Where the neighbour is too far for the multipliers to help."""
+        barrier = self._solver.config.solver.warm_barrier
+        return NlpSolver(self._program, self._solver.settings(self._tolerance, barrier))
+
+
+def warm_start_for(program: CollocationProgram, start: np.ndarray) -> WarmStart:
+    """Return how to begin with this start: by how much it misses rows and bounds."""
+    nlp = program.program
+    (_, rows) = nlp.functions()["nlp"](start, program.parameters)
+    missed = _outside(np.asarray(rows).ravel(), nlp.lower, nlp.upper)
+    rms = float(np.sqrt(np.mean(missed**2)))
+    beyond = float(_outside(start, *program.bounds).max())
+    if rms > _FURTHER_ROWS:
+        return _FAR
+    return _NEAR if rms < _NEAR_ROWS and beyond < _NEAR_BOUNDS else _FURTHER
+
+
+def _outside(values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Return by how much values are outside their bounds."""
+    return np.asarray(np.maximum(np.maximum(lower - values, values - upper), 0.0))

@@ -1,0 +1,347 @@
+"""Gait problems by direct multiple shooting, with the neural excitations as controls."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Final, cast
+
+import numpy as np
+
+from pathwalker_cli.conventions import GENERATORS
+from pathwalker_cli.errors import InputError
+from pathwalker_cli.gait.problem import GaitProblem
+from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME, excitation_from_rate
+from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
+from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.ocp.problem import ProblemNumbers, Variables
+from pathwalker_cli.ocp.shooting import ShootingProgram
+from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks, ShootingProblem
+from pathwalker_cli.ocp.shooting_motion import Shooter, ShootingNodes
+from pathwalker_cli.stride.verify import Violation, largest_violations
+
+__all__ = [
+    "EXCITATIONS",
+    "ShootingRound",
+    "ShootingSettings",
+    "ShootingSolution",
+    "gait_shooting",
+    "rounded_rate",
+    "solve_shooting",
+]
+
+EXCITATIONS: Final = tuple(f"{name}_excitation" for name in GENERATORS)
+
+_FIRST_BARRIER, _FIRST_PUSH = 1e-5, 1e-3
+"""Barrier and distance from the bounds at the start: a larger barrier leaves the neighbourhood of
+the motion that is handed in, a smaller distance blocks the first steps."""
+
+_NEXT_PUSH = 1e-8
+"""Distance from the bounds in later rounds: they start where the round before ended."""
+
+_BARRIER_SHARE = 1e-2
+"""Barrier at the end of a round, as a share of its tolerance; the next round begins with it."""
+
+Observer = Callable[[str, ProgressReport], None]
+
+
+@dataclass(frozen=True)
+class ShootingSettings:
+    """Settings of a solve by multiple shooting.
+
+    Args:
+        integration_tolerance: Largest error estimate of a step in scaled states: radians, metres,
+            activations, and speeds over 5 m/s or rad/s.
+        roundings: Half widths, one per round, to which the kink of equation (2) at e = a is
+            rounded off; the last one decides how exactly equation (2) is met.
+        tolerance: Optimality tolerance of every round.
+        constraint_tolerance: Largest scaled violation.
+        max_iterations: Iteration limit of a round.
+        repeats: How often the last round may be repeated with new steps.
+    """
+
+    integration_tolerance: float = 1e-4
+    roundings: tuple[float, ...] = (0.1, 0.01, 1e-3, 1e-4)
+    tolerance: float = 1e-5
+    constraint_tolerance: float = 1e-9
+    max_iterations: int = 300
+    repeats: int = 3
+
+
+@dataclass(frozen=True)
+class ShootingRound:
+    """One round: steps chosen anew, then a solve.
+
+    Args:
+        rounding: Half width of the rounded kink.
+        status: "converged" or the reason why not.
+        steps: Number of integration steps.
+        unknowns: Size of the nonlinear program.
+        iterations: Iterations.
+        seconds: Wall seconds of the solve.
+        seconds_functions: Part of them in function evaluations.
+        cost: Value of the objective.
+        integration_error: Largest error estimate of a step at the end of the round.
+    """
+
+    rounding: float
+    status: str
+    steps: int
+    unknowns: int
+    iterations: int
+    seconds: float
+    seconds_functions: float
+    cost: float
+    integration_error: float
+
+
+@dataclass(frozen=True)
+class ShootingSolution:
+    """The end of a solve by multiple shooting, converged or not.
+
+    Args:
+        status: "converged" or the reason why not.
+        cost: Value of the objective.
+        running_costs: Integrals over the whole motion by name, without weights.
+        nodes: Phase durations, parameters, and states, activations and excitations at the nodes.
+        motion: The motion between the nodes, integrated anew with equation (2) itself.
+        integration_error: Largest error estimate of a step, scaled as the tolerance.
+        defect: Largest gap between the end of an interval, integrated anew with equation (2)
+            itself, and its node, in scaled states.
+        violations: Largest violations, largest first.
+        rounds: The rounds.
+        seconds_build: Wall seconds for blocks and programs.
+        nlp: What the nonlinear solver returned last.
+        program: The last program.
+    """
+
+    status: str
+    cost: float
+    running_costs: dict[str, float]
+    nodes: ShootingNodes
+    motion: PhasedMotion
+    integration_error: float
+    defect: float
+    violations: tuple[Violation, ...]
+    rounds: tuple[ShootingRound, ...]
+    seconds_build: float
+    nlp: NlpResult = field(repr=False)
+    program: ShootingProgram = field(repr=False)
+
+    @property
+    def converged(self) -> bool:
+        """Whether all tolerances are met."""
+        return self.status == "converged"
+
+    @property
+    def durations(self) -> np.ndarray:
+        """Phase durations [s]."""
+        return self.nodes.durations
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """Free parameters."""
+        return self.nodes.parameters
+
+    @property
+    def distance(self) -> float:
+        """Distance of the motion [m]."""
+        return float(self.nodes.states[-1][-1, 0] - self.nodes.states[0][0, 0])
+
+    @property
+    def walking_speed(self) -> float:
+        """Mean speed [m/s]."""
+        return self.distance / float(self.durations.sum())
+
+    @property
+    def iterations(self) -> int:
+        """Iterations over all rounds."""
+        return sum(each.iterations for each in self.rounds)
+
+    @property
+    def seconds(self) -> float:
+        """Wall seconds of all solves."""
+        return sum(each.seconds for each in self.rounds)
+
+
+def rounded_rate(excitation: Any, activation: Any, rounding: Any) -> Any:
+    """Return the activation rate [1/s] of equation (2) with its kink at e = a rounded off.
+
+    Equation (2) is (e - a) / tau_D + (1 / tau_A - 1 / tau_D) e max(e - a, 0); in the maximum
+    |e - a| becomes the square root of (e - a)^2 + rounding^2.
+
+    Args:
+        excitation: Neural excitation e in [0, 1], shape (m,).
+        activation: Muscle activation a in [0, 1], shape (m,).
+        rounding: Half width of the kink in e - a; 0 gives equation (2) itself.
+    """
+    difference = excitation - activation
+    above = (difference + (difference**2 + rounding**2) ** 0.5) / 2
+    faster = 1 / ACTIVATION_TIME - 1 / DEACTIVATION_TIME
+    return difference / DEACTIVATION_TIME + faster * excitation * above
+
+
+def gait_shooting(gait: GaitProblem) -> ShootingProblem:
+    """Return a gait problem in which equation (2) turns excitations into activations.
+
+    Raises:
+        InputError: If the problem follows recorded instants: they need not stand at nodes.
+    """
+    problem = gait.build()
+    if not problem.sample.is_zero():
+        raise InputError(
+            "a fit of recorded instants has no multiple-shooting form",
+            mend="use collocation",
+        )
+    controls = Variables.make("e", EXCITATIONS, 1.0)
+    return ShootingProblem(problem, controls, rounded_rate, excitation_from_rate)
+
+
+def solve_shooting(
+    gait: GaitProblem,
+    numbers: ProblemNumbers,
+    motion: PhasedMotion,
+    settings: ShootingSettings | None = None,
+    observer: Observer | None = None,
+) -> ShootingSolution:
+    """Solve a gait problem by direct multiple shooting on the mesh of a motion.
+
+    In every round the integration steps are chosen along the last motion and kept during the
+    solve; the kink of equation (2) is rounded off less from round to round.
+
+    Args:
+        gait: The problem.
+        numbers: Its numbers; excitations are bounded to [0, 1] here.
+        motion: Where to begin, with the mesh to solve on; a solution by collocation.
+        settings: Settings.
+        observer: Called after every iteration with the name of the round.
+
+    Raises:
+        NotConvergedError: If a motion can not be integrated.
+    """
+    settings = settings or ShootingSettings()
+    began = time.perf_counter()
+    blocks = ShootingBlocks(gait_shooting(gait))
+    excitations: dict[tuple[str, ...], tuple[float, float]]
+    excitations = {(name,): (0.0, 1.0) for name in EXCITATIONS}
+    bounded = ProblemNumbers(
+        numbers.shared, numbers.bounds.replace(excitations), numbers.point_data
+    )
+    search = _Search(blocks, bounded, ShootingNodes.of(blocks.shooting, motion), settings, observer)
+    while not search.done:
+        search.advance()
+    return search.solution(time.perf_counter() - began)
+
+
+class _Search:
+    """The rounds of a solve and what they have reached."""
+
+    def __init__(
+        self,
+        blocks: ShootingBlocks,
+        numbers: ProblemNumbers,
+        nodes: ShootingNodes,
+        settings: ShootingSettings,
+        observer: Observer | None,
+    ) -> None:
+        self.blocks, self.numbers, self.nodes = blocks, numbers, nodes
+        self.settings, self.observer = settings, observer
+        self.rounds: list[ShootingRound] = []
+        self.program: ShootingProgram
+        self.result: NlpResult
+
+    @property
+    def shooter(self) -> Shooter:
+        return Shooter(self.blocks, self.numbers, self.nodes)
+
+    @property
+    def _accurate(self) -> bool:
+        return self.rounds[-1].integration_error <= self.settings.integration_tolerance
+
+    @property
+    def done(self) -> bool:
+        """Whether the last round is accurate, has failed, or was repeated often enough."""
+        behind = len(self.rounds) - len(self.settings.roundings)
+        failed = bool(self.rounds) and not self.result.converged
+        return failed or (behind >= 0 and (self._accurate or behind >= self.settings.repeats))
+
+    def advance(self) -> None:
+        """Choose steps and solve."""
+        settings, number = self.settings, len(self.rounds)
+        rounding = settings.roundings[min(number, len(settings.roundings) - 1)]
+        # a third of the tolerance is aimed at: the next solution moves a little
+        edges = self.shooter.choose(settings.integration_tolerance / 3)
+        self.program = ShootingProgram(
+            self.blocks, self.numbers, self.nodes.meshes, edges, rounding
+        )
+        name = f"rounding {rounding:g}"
+        watch = None if self.observer is None else _named(self.observer, name)
+        # the program offers all that a solve looks at
+        self.result = solve_program(
+            cast(Any, self.program),
+            self.program.from_nodes(self.nodes),
+            self._ipopt(),
+            observer=watch,
+        )
+        self.nodes = self.program.nodes(self.result.unknowns)
+        self.rounds.append(
+            ShootingRound(
+                rounding,
+                self.result.status,
+                sum(len(ends) - 1 for intervals in edges for ends in intervals),
+                self.program.program.size,
+                self.result.iterations,
+                self.result.seconds,
+                self.result.seconds_functions,
+                self.result.objective,
+                self.shooter.error(edges),
+            )
+        )
+
+    def _ipopt(self) -> IpoptSettings:
+        """Return settings that start near a motion without multipliers.
+
+        Those of the bounds begin at barrier over slack, as at the end of the round before; from
+        them IPOPT estimates those of the rows by least squares.
+        """
+        settings, first = self.settings, not self.rounds
+        push = _FIRST_PUSH if first else _NEXT_PUSH
+        pushes = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
+        return IpoptSettings(
+            tolerance=settings.tolerance,
+            constraint_tolerance=settings.constraint_tolerance,
+            max_iterations=settings.max_iterations,
+            initial_barrier=_FIRST_BARRIER if first else _BARRIER_SHARE * settings.tolerance,
+            extra={
+                "bound_mult_init_method": "mu-based",
+                "constr_mult_init_max": 1e8,
+                **dict.fromkeys(pushes, push),
+            },
+        )
+
+    def solution(self, seconds: float) -> ShootingSolution:
+        """Return what was reached after some wall seconds."""
+        status, shooter, edges = self.result.status, self.shooter, self.program.edges
+        if self.result.converged and not self._accurate:
+            status = "the integration does not reach the accuracy asked for"
+        layout, names = self.program.layout, self.blocks.problem.integrals
+        costs = (self.result.unknowns * layout.scale)[layout.integrals[-1]]
+        return ShootingSolution(
+            status=status,
+            cost=self.result.objective,
+            running_costs=dict(zip(names, costs.tolist(), strict=True)),
+            nodes=self.nodes,
+            motion=shooter.motion(edges),
+            integration_error=self.rounds[-1].integration_error,
+            defect=shooter.defect(edges),
+            violations=largest_violations(cast(Any, self.program), self.result),
+            rounds=tuple(self.rounds),
+            seconds_build=seconds - sum(each.seconds for each in self.rounds),
+            nlp=self.result,
+            program=self.program,
+        )
+
+
+def _named(observer: Observer, name: str) -> Callable[[ProgressReport], None]:
+    return lambda report: observer(name, report)

@@ -1,0 +1,157 @@
+"""What a solve returns: the last motion, how far it can be trusted, and how it came about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.gait.bounds import GaitBounds
+from pathwalker_cli.gait.shortfall import Shortfall
+from pathwalker_cli.model.walker import Walker
+from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.verify import (
+    ActiveBound,
+    Reintegration,
+    Violation,
+    second_engine_residual,
+)
+
+__all__ = ["TOO_WEAK", "GaitSolution", "LocalOptimum", "StageRecord"]
+
+TOO_WEAK: Final = "the muscles are too weak for a walk within the bounds"
+"""Status of a solve that found which torques are lacking."""
+
+
+@dataclass(frozen=True)
+class StageRecord:
+    """One stage as it went.
+
+    Args:
+        name: "tracking", "first mesh", "refined 1", "helped", ...
+        status: "converged" or the reason why not.
+        intervals: Mesh intervals.
+        unknowns: Size of the nonlinear program.
+        iterations: Iterations.
+        seconds: Wall seconds of the solve.
+        seconds_functions: Part of them in function evaluations.
+    """
+
+    name: str
+    status: str
+    intervals: int
+    unknowns: int
+    iterations: int
+    seconds: float
+    seconds_functions: float
+
+
+@dataclass(frozen=True)
+class LocalOptimum:
+    """Where one of several starts ended.
+
+    Args:
+        start: Number of the start; 0 is the study's own.
+        description: The start in words.
+        status: "converged" or the reason why not.
+        cost: Value of the objective.
+        walking_speed: Walking speed [m/s].
+        stiffness: K_D right, left, K_P right, left [N m/rad]; empty when barefoot.
+        iterations: Iterations over all stages.
+        seconds: Wall seconds.
+    """
+
+    start: int
+    description: str
+    status: str
+    cost: float
+    walking_speed: float
+    stiffness: tuple[float, ...]
+    iterations: int
+    seconds: float
+
+    @property
+    def converged(self) -> bool:
+        """Whether it is a solution."""
+        return self.status == "converged"
+
+
+@dataclass(frozen=True)
+class GaitSolution:
+    """The end of a solve, converged or not.
+
+    A solution that did not converge is sealed: `series` raises; `last_iterate` says what it is.
+
+    Args:
+        config: What was asked for.
+        walker: Who walks.
+        status: "converged" or the reason why not.
+        last_motion: The last iterate.
+        nlp: What the nonlinear solver returned last.
+        bounds: Bounds that were used and where they come from.
+        cost: Value of the objective.
+        cost_terms: Its terms by name; they add up to the cost.
+        violations: Largest violations, largest first.
+        active: Active bounds.
+        reintegration: Errors of an independent integrator.
+        start: Where the search began.
+        stages: The stages.
+        seconds: Wall seconds by part: build, solve, verify.
+        optima: Where all starts ended, best first; empty for a single start.
+        shortfall: Why no motion was found, where that was looked for.
+    """
+
+    config: StudyConfig
+    walker: Walker
+    status: str
+    last_motion: PhasedMotion
+    nlp: NlpResult
+    bounds: GaitBounds
+    cost: float
+    cost_terms: dict[str, float]
+    violations: tuple[Violation, ...]
+    active: tuple[ActiveBound, ...]
+    reintegration: Reintegration
+    start: str
+    stages: tuple[StageRecord, ...]
+    seconds: dict[str, float]
+    optima: tuple[LocalOptimum, ...] = ()
+    shortfall: Shortfall | None = None
+
+    @property
+    def converged(self) -> bool:
+        """Whether the solution meets all tolerances."""
+        return self.status == "converged"
+
+    @property
+    def series(self) -> GaitSeries:
+        """Time series of the solution.
+
+        Raises:
+            NotConvergedError: If it did not converge.
+        """
+        if not self.converged:
+            raise NotConvergedError(
+                f"{self.config.problem} did not converge ({self.status}); "
+                "its last iterate is no solution"
+            )
+        return self.last_iterate
+
+    @cached_property
+    def last_iterate(self) -> GaitSeries:
+        """Time series of the last iterate, converged or not."""
+        return gait_series(self.walker, self.last_motion)
+
+    @cached_property
+    def second_engine(self) -> float:
+        """Largest violation of the equations of motion in numeric Pinocchio [N, N m]."""
+        return second_engine_residual(self.last_iterate)
+
+    @property
+    def iterations(self) -> int:
+        """Iterations over all stages."""
+        return sum(stage.iterations for stage in self.stages)

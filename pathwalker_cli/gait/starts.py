@@ -1,0 +1,127 @@
+"""Several starts of one study: all local optima that they lead to, and the best of them.
+
+The problem is not convex; a start decides which optimum is found.  Starts differ in crouch, step
+length, speed and stiffness, spread by a Latin hypercube; the first one is the study's own.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.stats import qmc
+
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.gait.cost_terms import walked_distance
+from pathwalker_cli.gait.shortfall import Shortfall
+from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, StageRecord
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.io.processes import called_elsewhere
+from pathwalker_cli.nlp.ipopt import NlpResult
+
+__all__ = ["solve_from_starts", "spread_starts"]
+
+_SPREAD: Final = {"knee_flexion": (0.35, 1.0), "stride_ratio": (0.8, 1.5)}
+"""Ranges of the stylised gaits: crouch [rad] and stride length [leg lengths]."""
+
+_FASTER: Final = (1.0, 1.6)
+"""Range of their speed, as a multiple of the study's own start."""
+
+Finished = Callable[[LocalOptimum], None]
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What comes back from the process of one start."""
+
+    optimum: LocalOptimum
+    nlp: NlpResult
+    meshes: tuple[np.ndarray, ...]
+    stages: tuple[StageRecord, ...]
+    seconds: dict[str, float]
+    shortfall: Shortfall | None
+
+
+def spread_starts(config: StudyConfig, solver: GaitSolver) -> list[StudyConfig]:
+    """Return a study for every start; equal seeds give equal starts.
+
+    Args:
+        config: The study; `starts` says how many.
+        solver: Its solver, which knows the range of speed and stiffnesses.
+    """
+    single = config.model_copy(update={"starts": 1})
+    names = STIFFNESSES if solver.walker.orthosis else ()
+    lower, upper = solver.bounds.table.arrays(names)
+    low = [*(pair[0] for pair in _SPREAD.values()), _FASTER[0], *lower]
+    high = [*(pair[1] for pair in _SPREAD.values()), _FASTER[1], *upper]
+    cube = qmc.LatinHypercube(len(low), rng=np.random.default_rng(config.start.seed))
+    points = qmc.scale(cube.random(config.starts - 1), low, high)
+    studies = [single]
+    for knee_flexion, stride_ratio, faster, *stiffness in points.tolist():
+        start = config.start.model_copy(
+            update={
+                "gait": "synthetic",
+                "trial": "",
+                "knee_flexion": knee_flexion,
+                "stride_ratio": stride_ratio,
+                "walking_speed": faster * solver.start_speed,
+                "stiffness": dict(zip(names, stiffness, strict=True)),
+            }
+        )
+        studies.append(single.model_copy(update={"start": start}))
+    return studies
+
+
+def solve_from_starts(config: StudyConfig, finished: Finished | None = None) -> GaitSolution:
+    """Solve a study from all its starts, on as many processes as there are cores.
+
+    Args:
+        config: The study.
+        finished: Called with every local optimum as soon as it is there.
+
+    Returns:
+        The best solution, with all local optima ordered by cost.
+    """
+    solver = GaitSolver(config)
+    outcomes = list(_outcomes(spread_starts(config, solver), finished))
+    outcomes.sort(key=lambda o: (not o.optimum.converged, o.optimum.cost, o.optimum.start))
+    best = outcomes[0]
+    solver.stages, solver.seconds = list(best.stages), dict(best.seconds)
+    solver.shortfall = best.shortfall
+    solution = solver.restored(best.nlp, best.meshes)
+    optima = tuple(outcome.optimum for outcome in outcomes)
+    return replace(solution, optima=optima, start=best.optimum.description)
+
+
+def _outcomes(studies: list[StudyConfig], finished: Finished | None) -> Iterator[_Outcome]:
+    """Yield the outcomes of all starts as they come."""
+    workers = min(len(studies), len(os.sched_getaffinity(0)))
+    for outcome in called_elsewhere(_solved, list(enumerate(studies)), workers):
+        if finished is not None:
+            finished(outcome.optimum)
+        yield outcome
+
+
+def _solved(number: int, study: StudyConfig) -> _Outcome:
+    """Solve one start in a process of its own."""
+    solver = GaitSolver(study)
+    solution = solver.solve()
+    last = solution.last_motion
+    optimum = LocalOptimum(
+        start=number,
+        description=solver.stride.name,
+        status=solution.status,
+        cost=solution.cost,
+        walking_speed=walked_distance(last) / last.duration,
+        stiffness=tuple(last.parameters.tolist()),
+        iterations=solution.iterations,
+        seconds=float(sum(solution.seconds.values())),
+    )
+    meshes = last.meshes[: len(solver.gait.phases)]
+    return _Outcome(
+        optimum, solution.nlp, meshes, solution.stages, solution.seconds, solution.shortfall
+    )

@@ -1,0 +1,45 @@
+"""Blocks of gait problems, built once per structure and process.
+
+Everything that a patient or a config brings in is a number of the problem; problems of equal
+structure therefore share their blocks and all derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import Final
+
+from pathwalker_cli.gait.problem import GaitProblem
+from pathwalker_cli.nlp.kernels import kernels
+from pathwalker_cli.nlp.tape_store import cache_folder, keep_tapes, kept_tapes
+from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
+
+__all__ = ["gait_blocks"]
+
+_BUILT: Final[dict[Hashable, CollocationBlocks]] = {}
+
+
+def gait_blocks(gait: GaitProblem, degree: int) -> CollocationBlocks:
+    """Return the collocation blocks of a gait problem.
+
+    Args:
+        gait: The problem.
+        degree: Number of Radau points in an interval.
+    """
+    key = (gait.structure, degree)
+    if key not in _BUILT:
+        kept = None if kernels() is None else kept_tapes(key)
+        _BUILT[key] = CollocationBlocks(gait.build(), degree, kept)
+        if kept is None:
+            _keep(_BUILT[key], key)
+    return _BUILT[key]
+
+
+def _keep(blocks: CollocationBlocks, key: Hashable) -> None:
+    """Keep the tapes of blocks for other processes, if there are tapes and a place for them."""
+    if kernels() is None or cache_folder() is None:
+        return
+    tapes = {b.name: (b.rows, b.tapes) for b in blocks.blocks if b.matters}
+    known = {name: (rows, found) for name, (rows, found) in tapes.items() if found is not None}
+    if len(known) == len(tapes):
+        keep_tapes(key, known)

@@ -1,0 +1,93 @@
+"""A symmetric gait from one of its steps: the other step is the mirror image."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, mirror_permutation, mirrored
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.gait.cost_terms import walked_distance
+from pathwalker_cli.gait.problem import (
+    ACCELERATIONS,
+    ACTIVATIONS,
+    RATES,
+    RESERVES,
+    VELOCITIES,
+)
+from pathwalker_cli.model.contact import PHASES
+from pathwalker_cli.model.walker import Walker
+from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
+
+__all__ = ["asymmetries", "full_stride", "require_symmetry"]
+
+
+def asymmetries(walker: Walker) -> list[str]:
+    """Return in words what differs between the sides of a walker."""
+    order = mirror_permutation(GENERATORS)
+    strengths = walker.max_isometric_torque
+    zero = walker.contact_points(np.zeros(len(COORDINATES)))
+    q = np.linspace(-0.3, 0.6, len(COORDINATES))
+    swapped = q[mirror_permutation(COORDINATES)]
+    bias, mirrored_bias = (pin.nonLinearEffects(walker.model, walker.model.createData(), k, k)
+                           for k in (q, swapped))  # fmt: skip
+    differing = {
+        "strengths": not np.allclose(strengths, strengths[order]),
+        "contact points": not np.allclose(zero[:2], zero[2:]),
+        "masses or lengths": not np.allclose(
+            bias, mirrored_bias[mirror_permutation(COORDINATES)], rtol=1e-9, atol=1e-9
+        ),
+        "orthoses": walker.orthosis is not None and walker.orthosis[0] != walker.orthosis[1],
+    }
+    return [name for name, differs in differing.items() if differs]
+
+
+def require_symmetry(walker: Walker) -> None:
+    """Refuse half a cycle of a walker whose sides differ.
+
+    Raises:
+        ConfigError: If they do.
+    """
+    differing = asymmetries(walker)
+    if differing:
+        raise ConfigError(
+            f"asks for half a cycle, but {', '.join(differing)} differ between the sides of "
+            f"{walker.patient.id}",
+            where="half_cycle",
+            mend="set half_cycle to false",
+        )
+
+
+def full_stride(step: PhasedMotion) -> PhasedMotion:
+    """Return the stride whose second half is a step's mirror image.
+
+    Args:
+        step: Motion in the first four phases; it ends in its own mirrored beginning.
+    """
+    length = walked_distance(step)
+    costs = step.phases[-1].integrals[-1] - step.phases[0].integrals[0]
+    second = tuple(_mirrored(phase, i, length, costs) for i, phase in enumerate(step.phases))
+    return PhasedMotion(step.phases + second, step.parameters)
+
+
+def _mirrored(phase: PhaseMotion, i: int, length: float, costs: np.ndarray) -> PhaseMotion:
+    """Return a phase with left and right exchanged, one step on."""
+    here, there = PHASES[i], PHASES[i + len(PHASES) // 2]
+    state_order = mirror_permutation(COORDINATES + VELOCITIES)
+    names = ACCELERATIONS + here.forces + RESERVES
+    wanted = ACCELERATIONS + there.forces + RESERVES
+    algebraic_order = [names.index(mirrored(name)) for name in wanted]
+    states, inner = phase.states[:, state_order], phase.inner_states[..., state_order]
+    states[:, 0] += length
+    inner[..., 0] += length
+    return PhaseMotion(
+        name=there.name,
+        duration=phase.duration,
+        mesh=phase.mesh,
+        states=states,
+        smooth=phase.smooth[:, mirror_permutation(ACTIVATIONS)],
+        controls=phase.controls[:, mirror_permutation(RATES)],
+        integrals=phase.integrals + costs,
+        inner_states=inner,
+        algebraic=phase.algebraic[..., algebraic_order],
+    )

@@ -1,0 +1,277 @@
+"""How an optimum answers a change of its problem, from the KKT system there: no solve needed.
+
+Unknowns x and multipliers lam of an optimum follow any number p of the problem (Fiacco 1976) by
+
+    (H + S) dx + J' dlam = -d(grad L)/dp + S dl/dp,    J dx - D dlam = db/dp - dg/dp,
+
+with H and J the second derivatives of the Lagrangian L and the first ones of the rows g, and l and
+b the bounds that x and g press on.  S (multiplier / gap) and D (gap / multiplier) are what is left
+of the barrier at its end: an active bound moves x with it, an inactive one does nothing.
+
+The free parameters of the problem, the stiffnesses, are kept apart: the system is factorised with
+them fixed, and what is left is the small Hessian of the optimal cost in them.
+
+References:
+    Fiacco AV (1976). Sensitivity analysis for nonlinear programming using penalty methods.
+    Mathematical Programming 10:287-311.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+from scipy import sparse
+
+from pathwalker_cli.nlp.elimination import in_order_of, stage_keys
+from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.nlp.symmetric import SymmetricSystem
+from pathwalker_cli.ocp.collocation import CollocationProgram
+
+__all__ = ["Answer", "KktSystem"]
+
+_REGULARISATION: Final = 1e-10
+"""Added to the zero block, so that rows which say the same twice do no harm."""
+
+_DOUBTFUL: Final = 10.0
+"""Ratio of multiplier and gap, or its inverse, below which activity is not certain."""
+
+_INACTIVE: Final = 1e-9
+"""Ratio of multiplier and gap below which a row may be left out."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Derivatives by one number of the problem.
+
+    Args:
+        cost: Derivative of the optimal cost.
+        unknowns: Derivative of the scaled unknowns, shape (n,).
+        rows: Derivative of the multipliers of the rows, shape (m,).
+    """
+
+    cost: float
+    unknowns: np.ndarray
+    rows: np.ndarray
+
+    def plus(self, other: Answer, amount: float) -> Answer:
+        """Return the answer when another number changes with this one."""
+        return Answer(
+            self.cost + amount * other.cost,
+            self.unknowns + amount * other.unknowns,
+            self.rows + amount * other.rows,
+        )
+
+
+@dataclass(frozen=True)
+class _Change:
+    """What a number of the problem changes while unknowns and multipliers stay, per unit.
+
+    Args:
+        objective: Objective, with rows and bounds weighted by their multipliers.
+        gradient: Gradient of the Lagrangian, shape (n,).
+        rows: Rows minus the bounds that they press on, shape (m,).
+        bounds: Bounds that the unknowns press on, shape (n,).
+    """
+
+    objective: float
+    gradient: np.ndarray
+    rows: np.ndarray
+    bounds: np.ndarray
+
+
+class KktSystem:
+    """The KKT system of a program at its optimum.
+
+    Args:
+        program: The program.
+        result: Its solution; the tighter its tolerance, the clearer what is active.
+    """
+
+    def __init__(self, program: CollocationProgram, result: NlpResult) -> None:
+        self.program = program
+        self.result = result
+        self._functions = program.program.functions()
+        lower, upper = program.bounds
+        self._bound_ratio = _ratio(result.unknowns, lower, upper, result.multipliers.unknowns)
+        row_limits = program.program.lower, program.program.upper
+        row_ratio = _ratio(result.rows, *row_limits, result.multipliers.rows)
+        self._equality = row_limits[0] == row_limits[1]
+        self._rows = np.flatnonzero(self._equality | (row_ratio > _INACTIVE))
+        self._row_slack = np.where(self._equality, 0.0, 1.0 / np.maximum(row_ratio, _INACTIVE))
+        fixed = lower == upper
+        self.free = program.layout.parameters[~fixed[program.layout.parameters]]
+        """Places of the free parameters."""
+        fixed[program.layout.parameters] = True
+        self._fixed, self._moving = np.flatnonzero(fixed), np.flatnonzero(~fixed)
+        self._ratios = np.concatenate([self._bound_ratio, row_ratio])
+        self.active = int((self._ratios > 1.0).sum())
+        """Number of active inequalities."""
+        doubtful = (self._ratios > 1.0 / _DOUBTFUL) & (self._ratios < _DOUBTFUL)
+        self.doubtful = int(doubtful.sum())
+        """Number of inequalities that are neither clearly active nor clearly inactive."""
+
+    def changed(self, other: KktSystem) -> int:
+        """Return how many inequalities are clearly active in one system and clearly not in other.
+
+        Args:
+            other: The system of a program with the same unknowns and rows.
+        """
+        mine, theirs = self._ratios, other._ratios
+        gone = (mine > _DOUBTFUL) & (theirs < 1.0 / _DOUBTFUL)
+        come = (theirs > _DOUBTFUL) & (mine < 1.0 / _DOUBTFUL)
+        return int((gone | come).sum())
+
+    def answer(self, below: CollocationProgram, above: CollocationProgram, step: float) -> Answer:
+        """Return the derivatives by a number of the problem; free parameters follow it.
+
+        Args:
+            below: The same program with the number one step lower.
+            above: The same program with the number one step higher.
+            step: Half the distance between the two.
+        """
+        change = self._change(below, above, step)
+        answer = self._answer(change)
+        pull = self._pull(answer) + change.gradient[self.free]
+        return self._followed(answer, pull, list(range(len(self.free))))
+
+    @cached_property
+    def parameter_answers(self) -> tuple[Answer, ...]:
+        """Derivatives by every free parameter (scaled), the others held."""
+        n, m = len(self.result.unknowns), len(self.result.rows)
+        answers = []
+        for place in self.free:
+            bounds = np.zeros(n)
+            bounds[place] = 1.0
+            gradient = float(self._gradient[place])
+            answers.append(self._answer(_Change(gradient, np.zeros(n), np.zeros(m), bounds)))
+        return tuple(answers)
+
+    @cached_property
+    def parameter_hessian(self) -> np.ndarray:
+        """Second derivatives of the optimal cost in the free parameters (scaled)."""
+        columns = [self._pull(answer) for answer in self.parameter_answers]
+        matrix = np.array(columns).reshape(len(self.free), len(self.free))
+        return (matrix + matrix.T) / 2.0
+
+    def held(self, which: int) -> Answer:
+        """Return the derivatives by one free parameter (scaled) while the others follow."""
+        others = self._others(which)
+        pull = self.parameter_hessian[others, which]
+        return self._followed(self.parameter_answers[which], pull, others)
+
+    def curvature(self, which: int) -> float:
+        """Return the second derivative of the cost in one free parameter while others follow."""
+        others = self._others(which)
+        coupling = self.parameter_hessian[others, which]
+        follow = self._follow(coupling, others)
+        return float(self.parameter_hessian[which, which] + coupling @ follow)
+
+    def _others(self, which: int) -> list[int]:
+        return [i for i in range(len(self.free)) if i != which]
+
+    def _follow(self, pull: np.ndarray, which: list[int]) -> np.ndarray:
+        """Return how some free parameters follow a pull on them, their bounds in the way."""
+        matrix = self.parameter_hessian + np.diag(self._bound_ratio[self.free])
+        return -np.linalg.solve(matrix[np.ix_(which, which)], pull)
+
+    def _followed(self, answer: Answer, pull: np.ndarray, which: list[int]) -> Answer:
+        """Return an answer in which some free parameters follow."""
+        for i, amount in zip(which, self._follow(pull, which), strict=True):
+            answer = answer.plus(self.parameter_answers[i], float(amount))
+        return answer
+
+    @cached_property
+    def parameter_gradient(self) -> np.ndarray:
+        """First derivatives of the optimal cost in the free parameters (scaled)."""
+        return np.asarray(self._gradient[self.free])
+
+    @cached_property
+    def _gradient(self) -> np.ndarray:
+        """Gradient of the Lagrangian without the bounds on the unknowns, shape (n,)."""
+        return self._first_order(self.program)[1]
+
+    def _first_order(self, program: CollocationProgram) -> tuple[float, np.ndarray, np.ndarray]:
+        """Return objective, gradient of the Lagrangian and rows of a program at the optimum."""
+        x, p = self.result.unknowns, program.parameters
+        objective, gradient = self._functions["grad_f"](x, p)
+        rows, jacobian = self._functions["jac_g"](x, p)
+        lagrangian = np.asarray(gradient).ravel()
+        lagrangian = lagrangian + jacobian.sparse().T @ self.result.multipliers.rows
+        return float(objective), lagrangian, np.asarray(rows).ravel()
+
+    def _change(self, below: CollocationProgram, above: CollocationProgram, step: float) -> _Change:
+        low, high = self._first_order(below), self._first_order(above)
+        objective = (high[0] - low[0]) / (2 * step)
+        gradient, rows = ((b - a) / (2 * step) for a, b in zip(low[1:], high[1:], strict=True))
+        multipliers = self.result.multipliers
+        row_bounds, bounds = (
+            (b - a) / (2 * step)
+            for a, b in zip(self._pressed(below), self._pressed(above), strict=True)
+        )
+        rows = rows - row_bounds
+        weighted = objective + multipliers.rows @ rows - multipliers.unknowns @ bounds
+        return _Change(float(weighted), gradient, rows, bounds)
+
+    def _pressed(self, program: CollocationProgram) -> tuple[np.ndarray, np.ndarray]:
+        """Return the bounds that rows and unknowns press on; zero where there is none."""
+        result, limits = self.result, program.bounds
+        return (
+            _pressed(result.multipliers.rows, program.program.lower, program.program.upper),
+            _pressed(result.multipliers.unknowns, *limits),
+        )
+
+    def _answer(self, change: _Change) -> Answer:
+        """Return the derivatives, free parameters moving as `change.bounds` says."""
+        hessian, jacobian = self._second_order
+        unknowns = np.zeros(len(self.result.unknowns))
+        unknowns[self._fixed] = change.bounds[self._fixed]
+        push = np.where(np.isfinite(change.bounds), change.bounds, 0.0) * self._bound_ratio
+        upper = (push - change.gradient - hessian @ unknowns)[self._moving]
+        lower = (-change.rows - jacobian @ unknowns)[self._rows]
+        solved = self._factors.solve(np.concatenate([upper, lower]))
+        unknowns[self._moving] = solved[: len(self._moving)]
+        rows = np.zeros(len(self.result.rows))
+        rows[self._rows] = solved[len(self._moving) :]
+        return Answer(change.objective, unknowns, rows)
+
+    def _pull(self, answer: Answer) -> np.ndarray:
+        """Return the derivatives of the gradient in the free parameters along an answer."""
+        hessian, jacobian = self._second_order
+        return np.asarray((hessian @ answer.unknowns + jacobian.T @ answer.rows)[self.free])
+
+    @cached_property
+    def _second_order(self) -> tuple[Any, Any]:
+        """Hessian of the Lagrangian (n, n) and Jacobian of the rows (m, n)."""
+        x, p = self.result.unknowns, self.program.parameters
+        triangle = self._functions["hess_lag"](x, p, 1.0, self.result.multipliers.rows).sparse()
+        _, jacobian = self._functions["jac_g"](x, p)
+        return (triangle + sparse.triu(triangle, 1).T).tocsr(), jacobian.sparse().tocsr()
+
+    @cached_property
+    def _factors(self) -> SymmetricSystem:
+        hessian, jacobian = self._second_order
+        barrier = sparse.diags_array(self._bound_ratio[self._moving])
+        h = hessian[self._moving][:, self._moving] + barrier
+        a = jacobian[self._rows][:, self._moving]
+        d = sparse.diags_array(-_REGULARISATION - self._row_slack[self._rows])
+        unknowns, rows = stage_keys(self.program)
+        order = in_order_of(np.concatenate([unknowns[self._moving], rows[self._rows]]))
+        return SymmetricSystem(sparse.block_array([[h, a.T], [a, d]]), len(self._moving), order)
+
+
+def _ratio(
+    values: np.ndarray, lower: np.ndarray, upper: np.ndarray, multipliers: np.ndarray
+) -> np.ndarray:
+    """Return multiplier over gap of every inequality; 0 where the bounds leave no freedom."""
+    gap = np.where(multipliers > 0.0, upper - values, values - lower)
+    ratio = np.abs(multipliers) / np.maximum(gap, 1e-12)
+    return np.asarray(np.where((upper > lower) & np.isfinite(gap), ratio, 0.0))
+
+
+def _pressed(multipliers: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Return the bound on the side that the multiplier stands for; 0 where there is none."""
+    side = np.where(multipliers > 0.0, upper, lower)
+    return np.asarray(np.where(np.isfinite(side), side, 0.0))

@@ -1,0 +1,75 @@
+"""First-order conditions of a solution, evaluated outside the solver that found it.
+
+Objective, rows and their derivatives come from CasADi's virtual machine and from expressions that
+are derived anew, not from kept tapes or compiled kernels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pathwalker_cli.nlp.ipopt import Multipliers
+from pathwalker_cli.ocp.collocation import CollocationProgram
+
+__all__ = ["Optimality", "optimality"]
+
+_MEAN_MULTIPLIER: Final = 100.0
+"""Mean multiplier up to which IPOPT measures stationarity as it is (its s_max)."""
+
+
+@dataclass(frozen=True)
+class Optimality:
+    """How well a point meets the first-order conditions, in solver units.
+
+    Args:
+        cost: Value of the objective.
+        infeasibility: Largest violation of a row or bound.
+        stationarity: Largest entry of the gradient of the Lagrangian, scaled as IPOPT does.
+        complementarity: Largest product of a multiplier and the gap to its bound, scaled as well.
+        wrong_sign: Largest multiplier that pushes a row or unknown out of its bounds, scaled.
+    """
+
+    cost: float
+    infeasibility: float
+    stationarity: float
+    complementarity: float
+    wrong_sign: float
+
+
+def optimality(
+    program: CollocationProgram, unknowns: np.ndarray, multipliers: Multipliers
+) -> Optimality:
+    """Return how well a point and its multipliers meet the first-order conditions.
+
+    Args:
+        program: The program.
+        unknowns: Scaled unknowns.
+        multipliers: Multipliers, positive at upper bounds.
+    """
+    nlp = program.program
+    functions = nlp.plain_functions()
+    cost, gradient = functions["grad_f"](unknowns, program.parameters)
+    rows, jacobian = functions["jac_g"](unknowns, program.parameters)
+    rows = np.asarray(rows).ravel()
+    lagrangian = np.asarray(gradient).ravel() + jacobian.sparse().T @ multipliers.rows
+    lagrangian = lagrangian + multipliers.unknowns
+    values = np.concatenate([unknowns, rows])
+    lower, upper = (
+        np.concatenate([own, of_rows])
+        for own, of_rows in zip(program.bounds, (nlp.lower, nlp.upper), strict=True)
+    )
+    both = np.concatenate([multipliers.unknowns, multipliers.rows])
+    scale = max(_MEAN_MULTIPLIER, float(np.abs(both).mean())) / _MEAN_MULTIPLIER
+    gap = np.where(both > 0.0, upper - values, values - lower)
+    bounded = (lower < upper) & np.isfinite(gap)
+    wrong = (lower < upper) & ~np.isfinite(gap)
+    return Optimality(
+        cost=float(cost),
+        infeasibility=float(np.maximum(lower - values, values - upper).max(initial=0.0)),
+        stationarity=float(np.abs(lagrangian).max()) / scale,
+        complementarity=float(np.abs(both[bounded] * gap[bounded]).max(initial=0.0)) / scale,
+        wrong_sign=float(np.abs(both[wrong]).max(initial=0.0)) / scale,
+    )

@@ -1,0 +1,269 @@
+"""What is known about one patient: the validated content of `patient_data/<id>/patient.yaml`.
+
+SI units and radians; angles carry the signs of `conventions` (+ankle = plantarflexion).
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, PrivateAttr, field_validator, model_validator
+
+from pathwalker_cli.conventions import SIDES, Condition
+from pathwalker_cli.errors import PatientError, did_you_mean
+from pathwalker_cli.io.fields import Quantity, Sides, YamlModel, invalid
+from pathwalker_cli.io.yaml_file import load_yaml, read_mapping, validate
+from pathwalker_cli.paths import shipped
+from pathwalker_cli.patient.blocks import (
+    ContactPoints,
+    FootPoints,
+    OrthosisData,
+    Recorded,
+    SegmentLengths,
+    Strengths,
+)
+from pathwalker_cli.patient.proportions import (
+    ANKLE_HEIGHT,
+    HEEL_SHARE,
+    SOURCE,
+    TOE_SHARE,
+    default_length,
+)
+
+__all__ = [
+    "ContactPoints",
+    "FootPoints",
+    "OrthosisData",
+    "Patient",
+    "Recorded",
+    "SegmentLengths",
+    "Strengths",
+    "load_patient",
+    "shipped_patients",
+]
+
+JENSEN_AGES = Quantity(
+    "years",
+    4.0,
+    15.0,
+    "Jensen's fits start at boys of 4 years: choose age_for_regressions",
+    "Jensen's fits end at boys of 15 years: choose age_for_regressions (is it in months?)",
+)
+
+
+class Patient(YamlModel):
+    """One patient; lengths and contact points that were left out are filled in on request."""
+
+    id: str
+    description: str = ""
+    sex: Literal["male", "female"]
+    age: Annotated[float, Quantity("years", 0.5, 100.0, above="is it in months?")]
+    age_for_regressions: Annotated[float, JENSEN_AGES] | None = None
+    age_for_regressions_reason: str = ""
+    body_mass: Annotated[float, Quantity("kg", 5.0, 150.0, above="is it in grams?")]
+    height: Annotated[float, Quantity("m", 0.5, 2.2, above="is it in centimetres?")]
+    segment_lengths: SegmentLengths = SegmentLengths()
+    contact_points: ContactPoints = ContactPoints()
+    strengths: Strengths | None = None
+    orthosis: OrthosisData | None = None
+    recorded: dict[Condition, Recorded] = Field(default_factory=dict)
+    _source: Path | None = PrivateAttr(default=None)
+    _orthosis_source: Path | None = PrivateAttr(default=None)
+    _changes: tuple[str, ...] = PrivateAttr(default=())
+
+    @field_validator("id")
+    @classmethod
+    def _safe(cls, value: str) -> str:
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", value):
+            raise invalid(
+                f"is {value!r}, which is not safe as the name of a folder",
+                allowed="letters, digits, - and _, at most 64, a letter or digit first",
+            )
+        return value
+
+    @model_validator(mode="after")
+    def _regressions(self) -> Patient:
+        if self.age_for_regressions is None:
+            JENSEN_AGES.check(self.age)
+        elif not self.age_for_regressions_reason.strip():
+            raise invalid(
+                "has age_for_regressions without age_for_regressions_reason",
+                mend="say why the age for Jensen's regressions differs from the age",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _shoe(self) -> Patient:
+        if self.orthosis is not None and self.contact_points.orthosis is None:
+            raise invalid(
+                "has an orthosis but no contact_points.orthosis",
+                mend="add heel and toe of the shoe's sole, [x, z] in m from the ankle",
+            )
+        return self
+
+    @property
+    def source(self) -> Path | None:
+        """The file this was read from."""
+        return self._source
+
+    @property
+    def content(self) -> bytes:
+        """The bytes that this was read from: the file, and that of the orthosis if it is apart."""
+        files = (self._source, self._orthosis_source)
+        return b"".join(file.read_bytes() for file in files if file is not None)
+
+    @property
+    def folder(self) -> Path | None:
+        """The folder of that file; recordings stand in its `recordings`."""
+        return self._source.parent if self._source else None
+
+    @property
+    def regression_age(self) -> float:
+        """Age for the anthropometric regressions [years]."""
+        return self.age if self.age_for_regressions is None else self.age_for_regressions
+
+    @property
+    def max_isometric_torque(self) -> tuple[float, ...]:
+        """Strengths [N m] in the order of `conventions.GENERATORS`.
+
+        Raises:
+            PatientError: If the file gives none.
+        """
+        if self.strengths is None:
+            raise self._lacks("strengths", "add them, or estimate them from recordings")
+        return self.strengths.vector()
+
+    def require_orthosis(self) -> OrthosisData:
+        """Return the orthosis.
+
+        Raises:
+            PatientError: If the file describes none.
+        """
+        if self.orthosis is None:
+            raise self._lacks("orthosis", "add it, or choose the barefoot condition")
+        return self.orthosis
+
+    def length(self, name: str, side: str | None = None) -> float:
+        """Return a segment length or joint offset [m], measured or from proportions.
+
+        Args:
+            name: A field of `SegmentLengths`.
+            side: "right" or "left" for what exists twice.
+        """
+        given = getattr(self.segment_lengths, name)
+        if given is None:
+            return default_length(name, self.height)
+        return float(given[side or ""] if isinstance(given, Sides) else given)
+
+    def contacts(self, condition: Condition) -> Sides[FootPoints]:
+        """Return heel and toe of both feet in the foot frame.
+
+        Raises:
+            PatientError: If the patient has no orthosis and its shoe is asked for.
+        """
+        given = getattr(self.contact_points, condition)
+        if given is not None:
+            return given
+        if condition == "orthosis":
+            raise self._lacks("contact_points.orthosis", "add heel and toe of the shoe's sole")
+        sole = -round(ANKLE_HEIGHT * self.height, 3)
+        feet = {side: self.length("foot", side) for side in SIDES}
+        points = {
+            side: FootPoints(heel=(HEEL_SHARE * foot, sole), toe=(TOE_SHARE * foot, sole))
+            for side, foot in feet.items()
+        }
+        return Sides[FootPoints](right=points["right"], left=points["left"])
+
+    @property
+    def leg_length(self) -> float:
+        """Mean distance from hip to sole of the straight bare leg [m]."""
+        soles = self.contacts("barefoot")
+        return sum(
+            self.length("thigh", side)
+            + self.length("shank", side)
+            - (soles[side].heel[1] + soles[side].toe[1]) / 2.0
+            for side in SIDES
+        ) / len(SIDES)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """One sentence for everything that was filled in or overridden."""
+        missing = [
+            n for n in SegmentLengths.model_fields if getattr(self.segment_lengths, n) is None
+        ]
+        notes = [
+            f"segment length {name}: {default_length(name, self.height):g} m, from body "
+            f"proportions ({SOURCE})"
+            for name in missing
+        ]
+        if self.contact_points.barefoot is None:
+            notes.append("contact points barefoot: from foot length and height by proportion")
+        if self.sex == "female":
+            notes.append(
+                "segment masses: Jensen's regressions are for boys; none for girls is used"
+            )
+        if self.age_for_regressions is not None:
+            notes.append(
+                f"age for Jensen's regressions: {self.age_for_regressions:g} years instead of "
+                f"{self.age:g} ({self.age_for_regressions_reason.strip()})"
+            )
+        return (*notes, *self._changes)
+
+    def _lacks(self, key: str, mend: str) -> PatientError:
+        where = str(self._source) if self._source else f"patient {self.id}"
+        return PatientError(f"{key} is not given", where=where, mend=mend)
+
+
+def shipped_patients() -> tuple[str, ...]:
+    """Return the ids of the patients that come with PathWalker."""
+    return tuple(sorted(p.parent.name for p in shipped("patient_data").glob("*/patient.yaml")))
+
+
+def load_patient(id_or_path: str | Path) -> Patient:
+    """Read a patient.
+
+    Args:
+        id_or_path: A shipped id, a folder with `patient.yaml`, or a YAML file.  Its `orthosis` may
+            be the path of a file of its own, relative to the patient's.
+
+    Raises:
+        PatientError: If there is no such patient or its file is refused.
+    """
+    path = _patient_file(id_or_path)
+    mapping, lines = read_mapping(path, PatientError)
+    worn, apart = mapping.get("orthosis"), None
+    if isinstance(worn, str):
+        apart = path.parent / worn
+        orthosis = load_yaml(apart, OrthosisData, PatientError)
+        mapping = {**mapping, "orthosis": orthosis.model_dump(mode="json", exclude_none=True)}
+    patient = validate(mapping, Patient, where=str(path), error=PatientError, lines=lines)
+    patient._source, patient._orthosis_source = path, apart
+    return patient
+
+
+def _patient_file(id_or_path: str | Path) -> Path:
+    """Return the file that holds the patient."""
+    if str(id_or_path) in shipped_patients():
+        return shipped("patient_data") / str(id_or_path) / "patient.yaml"
+    path = Path(id_or_path)
+    if os.path.isdir(path):  # False too for what cannot be a path
+        return path / "patient.yaml"
+    if os.path.isfile(path):
+        return path
+    raise PatientError(
+        f"no patient '{id_or_path}'",
+        allowed=f"{', '.join(shipped_patients())}, a folder with patient.yaml, or a YAML file",
+        mend=did_you_mean(path.stem, [*shipped_patients(), *_patients_beside(path)]),
+    )
+
+
+def _patients_beside(path: Path) -> list[str]:
+    """Return the names of files, without ending, and folders that may hold a patient."""
+    if not os.path.isdir(path.parent):
+        return []
+    folders = [file.parent.name for file in path.parent.glob("*/patient.yaml")]
+    return [*folders, *(file.stem for file in path.parent.glob("*.yaml"))]

@@ -1,0 +1,143 @@
+"""A patient who differs from the file: numbers scaled or shifted by their place in it.
+
+One way in for everything that asks "what if": cohorts, sensitivities and uncertainty studies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from operator import add, mul
+from typing import Annotated, Any, Final
+
+from pydantic import Field
+
+from pathwalker_cli.conventions import CONDITIONS
+from pathwalker_cli.errors import ConfigError, PatientError, did_you_mean
+from pathwalker_cli.io.fields import Quantity, YamlModel
+from pathwalker_cli.io.yaml_file import validate
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient.blocks import SegmentLengths
+
+__all__ = ["Variation", "varied"]
+
+_IDENTITY: Final = frozenset({"id", "description", "sex", "age_for_regressions_reason"})
+"""Keys of a patient's file that hold no number."""
+
+Factor = Annotated[float, Quantity("", 0.01, 100.0)]
+Shift = Annotated[float, Quantity("SI units", -100.0, 100.0)]
+
+
+class Variation(YamlModel):
+    """How the patient of a study differs from the patient's file.
+
+    Keys are dotted places in the file, e.g. "strengths.knee_extension.right", "body_mass",
+    "segment_lengths.thigh" or "orthosis.neutral_angle"; what stands below a place changes with
+    it.  Factors come first, then shifts in SI units.
+    """
+
+    scale: dict[str, Factor] = Field(default_factory=dict)
+    shift: dict[str, Shift] = Field(default_factory=dict)
+
+    def merged(self, other: Variation) -> Variation:
+        """Return both variations as one: factors multiply, shifts add up."""
+        scale, shift = dict(self.scale), dict(self.shift)
+        for place, factor in other.scale.items():
+            scale[place] = scale.get(place, 1.0) * factor
+        for place, amount in other.shift.items():
+            shift[place] = shift.get(place, 0.0) + amount
+        return Variation(scale=scale, shift=shift)
+
+
+def varied(patient: Patient, variation: Variation) -> Patient:
+    """Return a patient with some numbers changed.
+
+    Lengths that the file leaves to body proportions are filled in before they are changed.
+
+    Args:
+        patient: The patient as in the file.
+        variation: What is different.
+
+    Raises:
+        ConfigError: If a place does not exist or holds no number.
+        PatientError: If the patient that results is refused.
+    """
+    if not variation.scale and not variation.shift:
+        return patient
+    content = _filled_in(patient)
+    for place, factor in variation.scale.items():
+        _change(content, f"variation.scale.{place}", place, partial(mul, factor))
+    for place, amount in variation.shift.items():
+        _change(content, f"variation.shift.{place}", place, partial(add, amount))
+    changed = validate(
+        content, Patient, where=f"{patient.id} with its variation", error=PatientError
+    )
+    notes = [f"{place} x {factor:g}" for place, factor in variation.scale.items()]
+    notes += [f"{place} {amount:+g}" for place, amount in variation.shift.items()]
+    changed._source, changed._orthosis_source = patient._source, patient._orthosis_source
+    changed._changes = (f"differs from the patient's file: {', '.join(notes)}",)
+    return changed
+
+
+def _filled_in(patient: Patient) -> dict[str, Any]:
+    """Return the content of a patient's file with all lengths written out."""
+    content: dict[str, Any] = patient.model_dump(mode="json")
+    lengths = content["segment_lengths"]
+    for name in SegmentLengths.model_fields:
+        if lengths[name] is None:
+            lengths[name] = patient.length(name, "right")
+    for condition in CONDITIONS:
+        points = content["contact_points"]
+        if points[condition] is None and condition == "barefoot":
+            points[condition] = patient.contacts(condition).model_dump(mode="json")
+    return {key: value for key, value in content.items() if value is not None}
+
+
+def _change(
+    content: dict[str, Any], where: str, place: str, change: Callable[[float], float]
+) -> None:
+    """Change every number at and below a place."""
+    *parents, last = place.split(".")
+    holder: Any = content
+    for depth, part in enumerate(parents):
+        holder = _below(holder, part, where, ".".join(parents[:depth]))
+    if not _holds_number(_below(holder, last, where, ".".join(parents))):
+        raise ConfigError("holds no number", where=where, allowed="the place of a number")
+    holder[last] = _mapped(holder[last], change)
+
+
+def _below(holder: Any, part: str, where: str, above: str) -> Any:
+    """Return what stands at a key.
+
+    Raises:
+        ConfigError: If there is no such key.
+    """
+    known = [key for key in holder if key not in _IDENTITY] if isinstance(holder, dict) else []
+    if part in known:
+        return holder[part]
+    raise ConfigError(
+        f"the patient's file has no '{part}'" + (f" in {above}" if above else ""),
+        where=where,
+        allowed=", ".join(known) or f"nothing below {above}, which is one number",
+        mend=did_you_mean(part, known),
+    )
+
+
+def _mapped(value: Any, change: Callable[[float], float]) -> Any:
+    """Return a value with all numbers in it changed."""
+    if isinstance(value, Mapping):
+        return {key: _mapped(entry, change) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_mapped(entry, change) for entry in value]
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return change(float(value))
+    return value
+
+
+def _holds_number(value: Any) -> bool:
+    """Return whether there is a number in a value."""
+    if isinstance(value, Mapping):
+        return any(map(_holds_number, value.values()))
+    if isinstance(value, list):
+        return any(map(_holds_number, value))
+    return isinstance(value, int | float) and not isinstance(value, bool)

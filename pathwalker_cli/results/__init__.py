@@ -1,0 +1,1 @@
+"""What a solve leaves behind: typed, written once, read back with suspicion."""

@@ -1,0 +1,383 @@
+"""The folder of a run: written in one stroke, read back with suspicion."""
+
+from __future__ import annotations
+
+import glob
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from pathwalker_cli.config import StudyConfig, load_config
+from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.gait.solution import GaitSolution
+from pathwalker_cli.gait.start import start_recording
+from pathwalker_cli.inverse.recorded_reference import recorded_reference
+from pathwalker_cli.io.atomic import check_room, swapped, sweep
+from pathwalker_cli.io.json_file import read_json, write_json
+from pathwalker_cli.io.lock import locked
+from pathwalker_cli.io.recordings import write_recording
+from pathwalker_cli.io.yaml_file import validate, yaml_text
+from pathwalker_cli.nlp.ipopt import Multipliers
+from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.results.metrics_model import RunMetrics
+from pathwalker_cli.results.motion_file import read_motion, write_motion
+from pathwalker_cli.results.multipliers_file import read_multipliers, write_multipliers
+from pathwalker_cli.results.run_metrics import (
+    METRICS_HASH,
+    RUN_FORMAT,
+    RunInputs,
+    metrics_hash,
+    run_inputs,
+    run_metrics,
+    sha256,
+)
+from pathwalker_cli.results.solve_text import shortfall_text
+from pathwalker_cli.results.tables import TABLES
+from pathwalker_cli.stride.figures import save_figures
+from pathwalker_cli.stride.series import GaitSeries
+
+__all__ = [
+    "CONFIG",
+    "ENTRIES",
+    "PATIENT",
+    "Run",
+    "check_target",
+    "claimed_run",
+    "config_text",
+    "default_folder",
+    "load_run",
+    "release_runs",
+    "repeatable_config",
+    "warm_start_run",
+    "write_run",
+]
+
+CONFIG: Final = "config.resolved.yaml"
+"""The config of a run with every value written out."""
+PATIENT: Final = "patient.yaml"
+"""The patient of a run, so that the folder is enough to verify and to repeat it."""
+_METRICS, _MOTION, _RECORDINGS = "metrics.json", "motion.npz", "recordings"
+_MULTIPLIERS: Final = "multipliers.npz"
+_SEAL: Final = "NOT_CONVERGED.txt"
+
+ENTRIES: Final = frozenset(
+    {CONFIG, PATIENT, _METRICS, _MOTION, _MULTIPLIERS, _RECORDINGS, _SEAL, "log.txt", "figures"}
+    | set(TABLES)
+)
+"""Everything that a run folder holds; a folder with anything else is never replaced."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run as it was read back.
+
+    Args:
+        folder: Where it stands.
+        metrics: Content of `metrics.json`.
+        motion: The exact motion.
+        config: The config with all defaults filled in.
+        multipliers: Multipliers of the solution by collocation; None if they were not kept.
+    """
+
+    folder: Path
+    metrics: dict[str, Any]
+    motion: PhasedMotion
+    config: StudyConfig
+    multipliers: Multipliers | None = None
+
+
+def config_text(config: StudyConfig) -> str:
+    """Return a config with all defaults filled in, as YAML that `load_config` reads."""
+    return yaml_text(config.model_dump(mode="json"), "The config of this run, every value written.")
+
+
+def default_folder(config: StudyConfig, patient: str) -> Path:
+    """Return where a run is written if nobody says where; a quick check stands apart.
+
+    Args:
+        config: The config.
+        patient: Id of the patient.
+    """
+    return Path("runs") / f"{config.problem}-{patient}{'-smoke' if config.smoke else ''}"
+
+
+def write_run(
+    folder: str | Path,
+    solution: GaitSolution,
+    log: Sequence[str] = (),
+    inputs: RunInputs | None = None,
+    more: Mapping[str, Any] | None = None,
+) -> dict[str, Any]:
+    """Write a run, converged or not, and return its metrics.
+
+    The folder is there in full at the end or, after an error, as it was before.
+
+    Args:
+        folder: The folder; an earlier run in it is replaced.
+        solution: How the solve ended.
+        log: Lines of `log.txt`.
+        inputs: What the run was made from; taken now if left out.
+        more: Further entries of `metrics.json`, plain values.
+
+    Raises:
+        DataError: If the folder holds something else, or cannot be written.
+    """
+    text = config_text(solution.config)
+    inputs = inputs or run_inputs(text, solution.walker.patient)
+    metrics = run_metrics(solution, inputs)
+    metrics |= more or {}
+    with _staged(Path(folder)) as staging:
+        (staging / CONFIG).write_text(text, encoding="utf-8")
+        (staging / PATIENT).write_text(inputs.patient, encoding="utf-8")
+        _keep_recording(staging, solution)
+        (staging / "log.txt").write_text("".join(f"{line}\n" for line in log), encoding="utf-8")
+        write_motion(staging / _MOTION, solution.last_motion)
+        metrics["motion_hash"] = sha256((staging / _MOTION).read_bytes())
+        if solution.converged and solution.config.transcription == "collocation":
+            write_multipliers(staging / _MULTIPLIERS, solution.nlp.multipliers)
+            metrics["multipliers_hash"] = sha256((staging / _MULTIPLIERS).read_bytes())
+        _write_series(staging, solution.last_iterate)
+        if not solution.converged:
+            (staging / _SEAL).write_text(_seal(solution), encoding="utf-8")
+        metrics[METRICS_HASH] = metrics_hash(metrics)
+        write_json(staging / _METRICS, metrics)
+    return metrics
+
+
+def _keep_recording(folder: Path, solution: GaitSolution) -> None:
+    """Write the recording that a run began with or followed, where the patient's would stand."""
+    start = solution.config.start
+    if start.gait == "recorded":
+        recording = start_recording(solution.walker, start)
+        write_recording(folder / _RECORDINGS / start.condition, recording)
+
+
+def _write_series(folder: Path, series: GaitSeries) -> None:
+    """Write tables and figures; no figures of a last iterate that holds no numbers."""
+    for name, write in TABLES.items():
+        write(folder / name, series)
+    if all(np.isfinite(values).all() for values in (series.q, series.force, series.net_torque)):
+        reference = recorded_reference(series.walker.patient, series.walker.condition)
+        save_figures(series, folder / "figures", reference)
+
+
+def _seal(solution: GaitSolution) -> str:
+    """Return what `NOT_CONVERGED.txt` says."""
+    why = solution.shortfall
+    lines = [
+        f"{solution.config.problem} did not converge: {solution.status}.",
+        *([] if why is None else [f"Why: {shortfall_text(why)}."]),
+        "The files beside this one show the last iterate, which is no solution: do not use it.",
+        "Largest violations, each in its own unit:",
+        *(f"  {violation.amount:.3g}  {violation.name}" for violation in solution.violations),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def check_target(folder: str | Path) -> Path:
+    """Return the real path of an output folder.
+
+    Raises:
+        DataError: If something stands there that is no run, or it cannot be written.
+    """
+    target, mend = Path(os.path.realpath(folder)), "choose another --out"
+    here = Path.cwd()
+    if target == here or target in here.parents:
+        raise DataError("is the current folder or one above it", where=str(folder), mend=mend)
+    above = next(path for path in (target, *target.parents) if path.exists())
+    if not above.is_dir():
+        raise DataError("is a file, not a folder", where=str(above), mend=mend)
+    for place in {above, target.parent} if target.exists() else {above}:
+        if not os.access(place, os.W_OK | os.X_OK):
+            raise DataError("cannot be written", where=str(place), mend=mend)
+    check_room(target)
+    names = {path.name for path in target.iterdir()} if target.exists() else set()
+    foreign = sorted(names - ENTRIES) if _METRICS in names else sorted(names)
+    if foreign:
+        what = f"is not empty and no run folder: it holds {foreign[0]}"
+        raise DataError(
+            what, where=str(folder), allowed="a new folder or an earlier run", mend=mend
+        )
+    return target
+
+
+@contextmanager
+def claimed_run(folder: str | Path, wait: bool = False) -> Iterator[None]:
+    """Keep other processes from writing a run folder meanwhile, and tidy up after killed ones.
+
+    Args:
+        folder: The run folder.
+        wait: Whether to wait for another process that is at work there.
+
+    Raises:
+        DataError: If another process is at work there, or no run can be written there.
+    """
+    target = check_target(folder)
+    with locked(target.with_name(f".{target.name}.lock"), Path(folder), wait):
+        _recover(target)
+        sweep(target.parent, target.name)
+        yield
+
+
+def release_runs(folder: Path) -> None:
+    """Tidy up after killed processes that wrote run folders in a folder."""
+    for lock in folder.glob(".*.lock"):
+        run = folder / lock.name.removeprefix(".").removesuffix(".lock")
+        with suppress(DataError), claimed_run(run):  # who is at work there still, goes on
+            pass
+
+
+def _recover(target: Path) -> None:
+    """Put a run back whose process was killed while it moved another one into its place."""
+    for old in target.parent.glob(f".{glob.escape(target.name)}.????????.tmp/old"):
+        if not target.exists():
+            old.rename(target)
+
+
+@contextmanager
+def _staged(folder: Path) -> Iterator[Path]:
+    """Yield an empty folder that takes the place of `folder` when the block ends without error."""
+    target = check_target(folder)
+    beside = next(path for path in target.parents if path.exists())
+    staging = None
+    try:
+        staging = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".tmp", dir=beside))
+        fresh = staging / "new"
+        fresh.mkdir()
+        yield fresh
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _exchange(fresh, check_target(folder), staging / "old")
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise DataError(
+            f"cannot be written: {reason}", where=str(folder), mend="choose another --out"
+        ) from None
+    finally:
+        if staging is not None:
+            shutil.rmtree(staging, ignore_errors=True)
+
+
+def _exchange(fresh: Path, target: Path, old: Path) -> None:
+    """Move a folder to its place; an older one comes back if that fails."""
+    if target.exists():
+        if swapped(fresh, target):
+            return
+        target.rename(old)
+    try:
+        fresh.rename(target)
+    except BaseException:
+        if old.exists():
+            old.rename(target)
+        raise
+
+
+def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
+    """Read a run.
+
+    Args:
+        folder: The folder of the run.
+        allow_unconverged: Whether the last iterate of a failed solve is wanted, knowingly.
+
+    Raises:
+        DataError: If the folder is no run, or a file of it is missing, truncated or foreign.
+        NotConvergedError: If the run did not converge.
+    """
+    folder = Path(folder)
+    metrics = _read_metrics(folder)
+    if (metrics["status"] != "converged" or (folder / _SEAL).exists()) and not allow_unconverged:
+        raise NotConvergedError(
+            f"{folder}: {metrics['problem']} did not converge there ({metrics['status']}); "
+            "its last iterate is no solution"
+        )
+    motion = read_motion(folder / _MOTION)
+    _check_hash(folder / _MOTION, metrics["motion_hash"])
+    multipliers = None
+    if (folder / _MULTIPLIERS).exists():
+        multipliers = read_multipliers(folder / _MULTIPLIERS)
+        _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
+    config = load_config(_file(folder, CONFIG))
+    expected = len(STIFFNESSES) if config.condition == "orthosis" else 0
+    if config.problem != metrics["problem"] or motion.parameters.size != expected:
+        where = str(folder / CONFIG)
+        raise DataError("does not belong to metrics.json beside it", where=where)
+    return Run(folder, metrics, motion, config, multipliers)
+
+
+def repeatable_config(run: Run) -> StudyConfig:
+    """Return the config of a run for the patient that its folder keeps, if it keeps one."""
+    kept = run.folder / PATIENT
+    patient = str(kept.resolve()) if kept.is_file() else run.config.patient
+    return run.config.model_copy(update={"patient": patient})
+
+
+def _check_hash(path: Path, expected: str | None) -> None:
+    """Refuse a file that is not the one that was written with `metrics.json`."""
+    if sha256(path.read_bytes()) != expected:
+        raise DataError("does not belong to metrics.json beside it", where=str(path),
+                        mend="solve again")  # fmt: skip
+
+
+def _file(folder: Path, name: str) -> Path:
+    """Return a file of a run that must be there."""
+    path = folder / name
+    if not folder.is_dir():
+        what = "is a file" if folder.exists() else "no such folder"
+        raise DataError(what, where=str(folder), allowed="the folder of a run")
+    if not path.is_file():
+        raise DataError(f"is no run folder: {name} is missing", where=str(folder),
+                        allowed="a folder that `pathwalker solve` wrote")  # fmt: skip
+    return path
+
+
+def _read_metrics(folder: Path) -> dict[str, Any]:
+    """Return the metrics of a run."""
+    path = _file(folder, _METRICS)
+    metrics = read_json(path, mend="solve again")
+    if "run_format" not in metrics:
+        raise DataError("lacks the key run_format", where=str(path),
+                        allowed="metrics that `pathwalker solve` wrote")  # fmt: skip
+    if metrics["run_format"] != RUN_FORMAT:
+        raise DataError(f"has run_format {metrics['run_format']}", where=str(path),
+                        allowed=str(RUN_FORMAT), mend="solve again")  # fmt: skip
+    validate(metrics, RunMetrics, where=str(path), error=DataError)
+    return metrics
+
+
+def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
+    """Return the run that a solve shall begin with.
+
+    Args:
+        folder: Its folder.
+        config: What is to be solved.
+
+    Raises:
+        DataError: If it cannot be used, did not converge or is about another condition.
+    """
+    try:
+        run = load_run(folder)
+    except NotConvergedError as error:
+        raise DataError(
+            str(error), where="--warm-start", allowed="a converged run", mend="solve it again first"
+        ) from None
+    if run.config.condition != config.condition:
+        raise DataError(
+            f"is a run of {run.config.problem} ({run.config.condition}), whose free parameters "
+            f"are not those of {config.problem} ({config.condition})",
+            where=f"--warm-start {folder}",
+            allowed=f"a run of the {config.condition} condition",
+        )
+    if run.config.fits != config.fits:
+        raise DataError(
+            f"is a run of {run.config.problem}, which is no start for {config.problem}",
+            where=f"--warm-start {folder}",
+            allowed="fits start from fits, predictions from predictions",
+        )
+    return run

@@ -1,0 +1,224 @@
+"""What a solve says at its end: proof, active bounds, times, and where the bounds come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES, SUFFIX, to_degrees
+from pathwalker_cli.gait.shortfall import Shortfall
+from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
+from pathwalker_cli.stride.verify import ActiveBound
+
+__all__ = [
+    "bound_line",
+    "bound_lines",
+    "detail_lines",
+    "failure_text",
+    "interesting",
+    "notes_together",
+    "optimum_lines",
+    "shortfall_text",
+    "source_lines",
+]
+
+_ANGLES: Final = frozenset(COORDINATES[2:])
+_UNITS: Final = {"duration": "s", "walking_speed": "m/s", "distance": "m"}
+
+_MET: Final = 1e-6
+"""Violation up to which a constraint counts as met, each in its own unit."""
+
+
+def interesting(bound: ActiveBound) -> bool:
+    """Return whether a bound is a choice that shapes the gait: joint range, duration, speed."""
+    return bound.name in _ANGLES or bound.name in _UNITS or bound.name in STIFFNESSES
+
+
+def bound_lines(solution: GaitSolution) -> list[str]:
+    """Return one line per active bound of interest; stiffnesses have their own note.
+
+    The bounds of a solve that did not converge hold nothing back yet.
+    """
+    if not solution.converged:
+        return []
+    return [
+        bound_line(bound)
+        for bound in solution.active
+        if interesting(bound) and bound.name not in STIFFNESSES
+    ]
+
+
+def bound_line(bound: ActiveBound) -> str:
+    """Return an active bound in words."""
+    where = f" in {', '.join(bound.places)}" if bound.places else ""
+    if bound.name in _ANGLES:
+        amount = f"{bound.value:.3f} rad ({to_degrees(bound.value):.1f} deg)"
+    else:
+        amount = f"{bound.value:.4g} {_UNITS.get(bound.name, 'N m/rad')}"
+    name = {"duration": "phase duration"}.get(bound.name, bound.name)
+    if bound.name not in _ANGLES:
+        name = name.replace("_", " ")
+    return f"{name} at its {bound.side} bound {amount}{where}"
+
+
+def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return label and text of proof, active bounds, stages and times.
+
+    Args:
+        solution: How the solve ended.
+        metrics: Its metrics as they were written.
+    """
+    worst = solution.violations[0]
+    errors = solution.reintegration
+    again = f"{errors.worst_position:.1e} rad or m, {errors.worst_velocity:.1e} rad/s or m/s"
+    stages = (f"{s.name} {s.iterations} in {s.seconds:.1f} s" for s in solution.stages)
+    seconds = (f"{part} {metrics[f'seconds_{part}']:.1f}" for part in ("build", "solve", "verify"))
+    rows = [
+        ("cost terms", _sum_text(solution.cost_terms)),
+        ("clinical goals", ", ".join(f"{_words(n)} {v:.4g}" for n, v in metrics["goals"].items())),
+        ("largest violation", f"{worst.amount:.1e} ({worst.name})"),
+        ("re-integration error", again),
+        ("second engine", f"equations of motion met within {solution.second_engine:.1e} N or N m"),
+        ("balances", _balance_text(metrics["balance"])),
+        ("iterations", f"{', '.join(stages)}; {solution.last_motion.intervals} intervals at last"),
+        ("seconds", ", ".join(seconds)),
+        ("dynamics, start", f"{solution.walker.backend}, {solution.start}"),
+    ]
+    return [*rows, *(("active bound", line) for line in bound_lines(solution))]
+
+
+def _balance_text(found: Mapping[str, float]) -> str:
+    energy = f"{found['energy']:.1e} J of {found['work_scale']:.3g} J"
+    momentum = f"{found['impulse']:.1e} N s of {found['impulse_scale']:.3g} N s"
+    return f"work and energy within {energy}, forces and momentum within {momentum}"
+
+
+def _sum_text(terms: Mapping[str, float]) -> str:
+    """Return the terms that count, e.g. "effort per distance 0.2535 + walking speed -1.3"."""
+    return " + ".join(f"{_words(name)} {value:.4g}" for name, value in terms.items() if value)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def optimum_lines(optima: Sequence[LocalOptimum]) -> list[tuple[str, str]]:
+    """Return label and text of every local optimum, best first, and how far they lie apart."""
+    lines = []
+    for found in optima:
+        springs = ", ".join(f"{value:.1f}" for value in found.stiffness)
+        text = f"start {found.start}: cost {found.cost:.5g}, {found.walking_speed:.3f} m/s"
+        text += f", K_D r l, K_P r l {springs} N m/rad" if springs else ""
+        lines.append(("local optimum", text if found.converged else f"{text}, {found.status}"))
+    costs = [found.cost for found in optima if found.converged]
+    if len(costs) > 1:
+        near = sum(cost <= costs[0] + 0.05 * abs(costs[0]) for cost in costs)
+        spread = (costs[-1] - costs[0]) / abs(costs[0])
+        lines.append(
+            (
+                "local optima",
+                f"{len(costs)} of {len(optima)} starts converged, {near} within 5 % of the best; "
+                f"the worst is {100 * spread:.1f} % above",
+            )
+        )
+    return lines
+
+
+def source_lines(sources: Mapping[str, str]) -> list[str]:
+    """Return where the bounds come from, in short: equal reasons are said once.
+
+    Args:
+        sources: `GaitBounds.sources`.
+    """
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name, text in sources.items():
+        if name in _ANGLES:
+            key = ("joint ranges", text.partition("] rad, ")[2] or text)
+        elif name.startswith("duration"):
+            key = ("phase durations", text)
+        elif name in STIFFNESSES:
+            key = ("stiffness", text.partition(": ")[0])
+        else:
+            key = (name.replace("_", " "), text)
+        groups.setdefault(key, []).append(name.removeprefix("duration of "))
+    kinds = [kind for kind, _ in groups]
+    lines = []
+    for (kind, reason), names in groups.items():
+        several = kinds.count(kind) > 1
+        lines.append(f"{kind} of {', '.join(names)}: {reason}" if several else f"{kind}: {reason}")
+    return lines
+
+
+def failure_text(solution: GaitSolution, folder: str) -> str:
+    """Return one sentence about a solve that did not converge.
+
+    Args:
+        solution: How it ended.
+        folder: Where its files are.
+    """
+    why = solution.shortfall
+    parts = [] if why is None else [shortfall_text(why)]
+    if why is None or not why.too_weak:
+        parts.append(_violations_text(solution))
+    detail = "; ".join(parts)
+    return (
+        f"{solution.config.problem} did not converge: {solution.status}; {detail}; "
+        f"the last iterate is in {folder}, marked as not converged"
+    )
+
+
+def _violations_text(solution: GaitSolution) -> str:
+    """Return in words which constraints are not met, and how far off an integrator is."""
+    worst = [v for v in solution.violations if not v.amount <= _MET][:3]
+    if worst:
+        named = ", ".join(f"{v.name} by {v.amount:.2g}" for v in worst)
+        detail = f"the worst violations are {named}"
+    else:
+        largest = np.max([v.amount for v in solution.violations])
+        detail = f"all constraints are met within {largest:.1e}"
+    errors = solution.reintegration
+    if errors is not None:
+        detail += (
+            f", and an independent integrator misses the next node by "
+            f"{errors.worst_position:.1e} (rad, m) and {errors.worst_velocity:.1e} (rad/s, m/s)"
+        )
+    return detail
+
+
+def shortfall_text(shortfall: Shortfall) -> str:
+    """Return in words why no motion was found."""
+    if not shortfall.within_bounds:
+        return "not even muscles of any strength were found to walk within the bounds"
+    if not shortfall.missing:
+        return "the muscles are strong enough, so another start may lead to a solution"
+    lacking = [
+        f"{_in_words(missing.generator)} {missing.torque:.1f} N m beyond its "
+        f"{missing.strength:.1f} N m, at {missing.percent:.0f} % of the stride"
+        for missing in shortfall.missing[:3]
+    ]
+    more = len(shortfall.missing) - len(lacking)
+    others = f"; of {more} others a smaller share" if more else ""
+    return f"the least help with which a walk was found is {', '.join(lacking)}{others}"
+
+
+def _in_words(generator: str) -> str:
+    """Return e.g. "right ankle extension" for "ankle_extension_r"."""
+    stem, _, suffix = generator.rpartition("_")
+    side = next((side for side in SIDES if SUFFIX[side] == suffix), "")
+    return f"{side} {stem}".replace("_", " ") if side else generator.replace("_", " ")
+
+
+def notes_together(notes: Sequence[str]) -> tuple[str, ...]:
+    """Return what was filled in for a patient, lengths from body proportions in one sentence.
+
+    Args:
+        notes: Notes of the patient, one per number that was filled in.
+    """
+    begin = "segment length "
+    lengths = [note for note in notes if note.startswith(begin)]
+    names = ", ".join(note.removeprefix(begin).partition(":")[0] for note in lengths)
+    reason = lengths[0].partition(", ")[2] if lengths else ""
+    together = (f"segment lengths {names}: {reason}",) if lengths else ()
+    return (*together, *(note for note in notes if note not in lengths))

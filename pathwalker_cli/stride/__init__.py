@@ -1,0 +1,1 @@
+"""One stride, predicted or recorded: its curves, its measures, its proof and its figures."""

@@ -1,0 +1,92 @@
+"""Figure of muscle activations and neural excitations over the gait cycle."""
+
+from __future__ import annotations
+
+from itertools import product
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SUFFIX, Side
+from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
+from pathwalker_cli.stride.figures.curves import Reference
+from pathwalker_cli.stride.figures.style import (
+    LINE_COLOUR,
+    LINE_STYLE,
+    NEUTRAL,
+    dress,
+    events_handle,
+    legend,
+    new_figure,
+    percent_axis,
+    side_handles,
+    toe_off_line,
+)
+from pathwalker_cli.stride.series import GaitSeries
+
+__all__ = ["activations"]
+
+_DIRECTIONS = ("extension", "flexion")
+
+
+def activations(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return activation and excitation of every generator over the gait cycle of its side.
+
+    Args:
+        series: The stride.
+        reference: Not used: activations are not recorded.
+    """
+    fig = new_figure(4.6)
+    grid = fig.subplots(4, 4, sharex=True, sharey=True)
+    columns = tuple(product(BOTH_SIDES, _DIRECTIONS))
+    for row, joint in zip(grid, LEG_JOINTS, strict=False):
+        for ax, (side, direction) in zip(row, columns, strict=True):
+            name = f"{joint}_{direction}_{SUFFIX[side]}"
+            _draw(ax, series, name, side, f"{side.capitalize()} {joint}\n{direction}")
+    for ax, title, name in zip(
+        grid[-1],
+        ("Trunk\nforward", "Trunk\nbackward"),
+        ("lumbar_extension", "lumbar_flexion"),
+        strict=False,
+    ):
+        _draw(ax, series, name, "right", title)
+    _label(grid)
+    legend(
+        fig,
+        [
+            *side_handles(),
+            Line2D([], [], color=NEUTRAL, linewidth=0.6, label="thin: excitation"),
+            events_handle(),
+        ],
+    )
+    return fig
+
+
+def _draw(ax: Axes, series: GaitSeries, name: str, side: Side, title: str) -> None:
+    """Draw one generator."""
+    cycle, column = own_cycle(series, side), GENERATORS.index(name)
+    colour = LINE_COLOUR[side]
+    dress(ax, title)
+    ax.plot(cycle.percent, series.excitation[cycle.index, column], color=colour, linewidth=0.6)
+    ax.plot(
+        cycle.percent,
+        series.activation[cycle.index, column],
+        color=colour,
+        linestyle=LINE_STYLE[side],
+    )
+    toe_off_line(ax, cycle)
+
+
+def _label(grid: list[list[Axes]]) -> None:
+    """Label the outer axes and clear the two panels without a generator."""
+    for row in grid:
+        row[0].set_ylabel("activation [1]", labelpad=2.0)
+    for top, ax in zip(grid[-2][2:], grid[-1][2:], strict=True):
+        ax.axis("off")
+        percent_axis(top, "own cycle\n[%]")
+        top.xaxis.set_tick_params(labelbottom=True)
+    for ax in grid[-1][:2]:
+        percent_axis(ax, "right cycle\n[%]")
+    grid[0][0].set_ylim(-0.03, 1.05)
+    grid[0][0].set_yticks([0.0, 0.5, 1.0])

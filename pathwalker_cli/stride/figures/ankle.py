@@ -1,0 +1,135 @@
+"""Figures over the ankle angle: the orthosis curve and the net ankle torque."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pathwalker_cli.conventions import COORDINATES, SUFFIX, Side, to_degrees
+from pathwalker_cli.errors import InputError
+from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
+from pathwalker_cli.stride.ankle_profile import ankle_torque_line
+from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.feet import toe_bearing
+from pathwalker_cli.stride.figures.curves import Reference
+from pathwalker_cli.stride.figures.style import (
+    LINE_COLOUR,
+    LINE_STYLE,
+    NEUTRAL,
+    dress,
+    legend,
+    new_figure,
+    zero_line,
+)
+from pathwalker_cli.stride.series import GaitSeries
+
+__all__ = ["ankle_torque", "orthosis_curves"]
+
+_ANGLE = "dorsiflexion [deg]"
+_TORQUE = "plantarflexing torque [N m]"
+
+
+def orthosis_curves(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return the torque-angle curve of each orthosis with the part of it that was walked.
+
+    Dorsiflexion is positive, and so is the torque with which the orthosis resists it.
+
+    Args:
+        series: The stride, with orthoses.
+        reference: Not used: the torque of an orthosis is not recorded.
+
+    Raises:
+        InputError: If the walker wears no orthoses.
+    """
+    if series.walker.orthosis is None:
+        raise InputError("a barefoot walker has no orthosis curve", allowed="condition orthosis")
+    fig = new_figure(2.4)
+    panels = fig.subplots(1, 2, sharex=True, sharey=True)
+    for i, (ax, side) in enumerate(zip(panels, BOTH_SIDES, strict=True)):
+        _draw_orthosis(ax, series, side, series.walker.orthosis[i])
+        dress(ax, _title(series, side), _ANGLE, _TORQUE if i == 0 else "")
+    legend(
+        fig,
+        [
+            Line2D([], [], color=NEUTRAL, linewidth=0.8, label="curve"),
+            Line2D([], [], color=NEUTRAL, linewidth=3.0, alpha=0.5, label="part that was walked"),
+            Line2D([], [], color=NEUTRAL, linewidth=0.8, linestyle="-.", label="stop"),
+        ],
+    )
+    return fig
+
+
+def _draw_orthosis(ax: Axes, series: GaitSeries, side: Side, orthosis: OrthosisSide) -> None:
+    """Draw curve, walked part, stops and stiffness of one orthosis."""
+    i, colour = BOTH_SIDES.index(side), LINE_COLOUR[side]
+    k_d, k_p = float(series.stiffness[i]), float(series.stiffness[i + 2])
+    angle = series.column(f"ankle_{SUFFIX[side]}")
+    stops = (orthosis.dorsiflexion_stop, orthosis.plantarflexion_stop)
+    low, high = min(*stops, angle.min()) - 0.03, max(*stops, angle.max()) + 0.03
+    zero_line(ax)
+    for ends, look in (
+        ((low, high), {"linewidth": 0.8, "linestyle": LINE_STYLE[side]}),
+        ((angle.min(), angle.max()), {"linewidth": 3.5, "alpha": 0.4}),
+    ):
+        span = np.linspace(*ends, 300)
+        torque = np.asarray(orthosis_torque(orthosis, span, k_d, k_p)).ravel()
+        ax.plot(-to_degrees(span), torque, color=colour, **look)
+    for stop in stops:
+        ax.axvline(-float(to_degrees(stop)), color=NEUTRAL, linewidth=0.8, linestyle="-.")
+
+
+def _title(series: GaitSeries, side: Side) -> str:
+    """Return the side with its stiffnesses in both units."""
+    i = BOTH_SIDES.index(side)
+    k_d, k_p = (float(series.stiffness[row]) for row in (i, i + 2))
+    return (
+        f"{side.capitalize()} orthosis\nK_D {k_d:.1f}, K_P {k_p:.1f} N m/rad\n"
+        f"({np.deg2rad(k_d):.2f}, {np.deg2rad(k_p):.2f} N m/deg)"
+    )
+
+
+def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return the net ankle torque over the ankle angle of each side, with its mean slope.
+
+    Dorsiflexion is positive, and so is the plantarflexing torque of muscles and orthosis.  The
+    slope is that of `ankle_profile.ankle_torque_slope`, over the thick part of the path.
+
+    Args:
+        series: The stride.
+        reference: Not used.
+    """
+    fig = new_figure(2.4)
+    panels = fig.subplots(1, 2, sharex=True, sharey=True)
+    for i, (ax, side) in enumerate(zip(panels, BOTH_SIDES, strict=True)):
+        _draw_profile(ax, series, side)
+        dress(ax, f"{side.capitalize()} ankle", _ANGLE, _TORQUE if i == 0 else "")
+    legend(
+        fig,
+        [
+            Line2D([], [], color=NEUTRAL, linewidth=1.6, label="foot flat or on its toe"),
+            Line2D([], [], color=NEUTRAL, linewidth=0.6, label="swing and heel contact"),
+            Line2D([], [], color="black", linewidth=0.8, linestyle=":", label="mean slope"),
+        ],
+    )
+    return fig
+
+
+def _draw_profile(ax: Axes, series: GaitSeries, side: Side) -> None:
+    """Draw the torque-angle path of one ankle and its mean slope."""
+    name = f"ankle_{SUFFIX[side]}"
+    angle = -series.column(name)
+    torque = series.net_torque[:, COORDINATES.index(name)]
+    bearing, (slope, offset) = toe_bearing(series, side), ankle_torque_line(series, side)
+    look: dict[str, Any] = {"color": LINE_COLOUR[side], "linestyle": LINE_STYLE[side]}
+    zero_line(ax)
+    ax.plot(to_degrees(angle), torque, linewidth=0.6, **look)
+    thick = np.where(bearing, torque, np.nan)
+    ax.plot(to_degrees(angle), thick, linewidth=1.6, **look)
+    ends = np.array([angle[bearing].min(), angle[bearing].max()])
+    ax.plot(to_degrees(ends), offset + slope * ends, color="black", linewidth=0.8, linestyle=":")
+    text = f"{slope:.0f} N m/rad\n({np.deg2rad(slope):.2f} N m/deg)"
+    ax.text(0.03, 0.97, text, transform=ax.transAxes, va="top")

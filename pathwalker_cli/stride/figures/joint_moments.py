@@ -1,0 +1,75 @@
+"""Figure of the net joint moments over the gait cycle."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from pathwalker_cli.conventions import COORDINATES, SUFFIX
+from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
+from pathwalker_cli.stride.figures.curves import EXTENSION, Reference, draw_band, draw_sides
+from pathwalker_cli.stride.figures.style import (
+    LINE_COLOUR,
+    LINE_STYLE,
+    NEUTRAL,
+    band_handle,
+    dress,
+    events_handle,
+    legend_panel,
+    new_figure,
+    percent_axis,
+    side_handles,
+    zero_line,
+)
+from pathwalker_cli.stride.series import GaitSeries
+
+__all__ = ["joint_moments"]
+
+_TITLES: Final = {
+    "hip": "Hip, extension +",
+    "knee": "Knee, extension +",
+    "ankle": "Ankle, plantarflexion +",
+}
+
+
+def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return net moments at hip, knee and ankle over the gait cycle of each side.
+
+    Internal moments, of muscles and orthosis on the joint, over mass with the orthosis; extension
+    and plantarflexion are positive.  Thin lines at the ankle are the part of the orthosis.
+
+    Args:
+        series: The stride.
+        reference: Recorded bands to draw behind.
+    """
+    bands, mass = reference.moments if reference else {}, series.walker.total_mass
+    fig = new_figure(2.9)
+    panels = fig.subplots(2, 2).ravel()
+    for ax, (joint, title) in zip(panels, _TITLES.items(), strict=False):
+        factor, values = EXTENSION[joint] / mass, {}
+        for side in BOTH_SIDES:
+            name = f"{joint}_{SUFFIX[side]}"
+            draw_band(ax, bands.get(name), side, factor)
+            values[side] = factor * series.net_torque[:, COORDINATES.index(name)]
+        dress(ax, title, y="net moment [N m/kg]")
+        zero_line(ax)
+        draw_sides(ax, series, values)
+        percent_axis(ax)
+        if joint == "ankle" and series.walker.orthosis:
+            _draw_orthosis(ax, series, factor)
+    handles = [*side_handles(), events_handle(), *([band_handle()] if bands else [])]
+    if series.walker.orthosis:
+        handles.append(Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis alone"))
+    legend_panel(panels[-1], handles)
+    return fig
+
+
+def _draw_orthosis(ax: Axes, series: GaitSeries, factor: float) -> None:
+    """Draw the torques of the orthoses as thin lines."""
+    for i, side in enumerate(BOTH_SIDES):
+        cycle, torque = own_cycle(series, side), factor * series.orthosis_torque[:, i]
+        colour, style = LINE_COLOUR[side], LINE_STYLE[side]
+        ax.plot(cycle.percent, torque[cycle.index], color=colour, linestyle=style, linewidth=0.7)

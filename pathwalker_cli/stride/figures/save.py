@@ -1,0 +1,117 @@
+"""All figures of a stride, as files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Final
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from pathwalker_cli.io.atomic import atomic_path
+from pathwalker_cli.stride.figures.activations import activations
+from pathwalker_cli.stride.figures.ankle import ankle_torque, orthosis_curves
+from pathwalker_cli.stride.figures.curves import Reference
+from pathwalker_cli.stride.figures.ground_forces import ground_forces
+from pathwalker_cli.stride.figures.joint_angles import joint_angles
+from pathwalker_cli.stride.figures.joint_moments import joint_moments
+from pathwalker_cli.stride.figures.stick_figures import stick_figures
+from pathwalker_cli.stride.figures.style import STYLE
+from pathwalker_cli.stride.series import GaitSeries
+
+__all__ = ["FIGURES", "figure_names", "make_figure", "save_figure", "save_figures", "save_formats"]
+
+FORMATS: Final = ("png", "svg")
+"""What every figure is saved as."""
+
+DPI: Final = 200
+"""Dots per inch of the PNG files."""
+
+FIGURES: Final[dict[str, Callable[[GaitSeries, Reference | None], Figure]]] = {
+    "stick_figures": stick_figures,
+    "joint_angles": joint_angles,
+    "joint_moments": joint_moments,
+    "ground_forces": ground_forces,
+    "activations": activations,
+    "ankle_torque": ankle_torque,
+    "orthosis_curves": orthosis_curves,
+}
+"""Names of the figures and what makes them."""
+
+# Neither a date nor a version: the same stride gives the same bytes.
+_METADATA: Final[dict[str, dict[str, str | None]]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+}
+
+
+def figure_names(series: GaitSeries) -> tuple[str, ...]:
+    """Return the figures that make sense for a stride: no orthosis curve when barefoot."""
+    worn = series.walker.orthosis is not None
+    return tuple(name for name in FIGURES if worn or name != "orthosis_curves")
+
+
+def make_figure(name: str, series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return a figure in the common style.
+
+    Args:
+        name: A key of `FIGURES`.
+        series: The stride.
+        reference: Recorded bands to draw behind.
+    """
+    with mpl.rc_context(STYLE):
+        return FIGURES[name](series, reference)
+
+
+def save_figures(
+    series: GaitSeries,
+    folder: str | Path,
+    reference: Reference | None = None,
+    formats: Sequence[str] = FORMATS,
+) -> tuple[str, ...]:
+    """Save every figure of a stride and return the file names.
+
+    Args:
+        series: The stride.
+        folder: Where; made if it does not exist.
+        reference: Recorded bands to draw behind.
+        formats: "png", "svg" or both.
+    """
+    return tuple(
+        file
+        for name in figure_names(series)
+        for file in save_formats(make_figure(name, series, reference), folder, name, formats)
+    )
+
+
+def save_formats(
+    figure: Figure, folder: str | Path, name: str, formats: Sequence[str] = FORMATS
+) -> tuple[str, ...]:
+    """Save a figure in several formats and return the file names.
+
+    Args:
+        figure: A figure made under `style.STYLE`.
+        folder: Where; made if it does not exist.
+        name: Name of the files without extension.
+        formats: "png", "svg" or both.
+    """
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    files = tuple(f"{name}.{extension}" for extension in formats)
+    for file in files:
+        save_figure(figure, Path(folder) / file)
+    return files
+
+
+def save_figure(figure: Figure, path: str | Path) -> None:
+    """Save a figure in one stroke; its layout is settled by the first format.
+
+    Args:
+        figure: A figure made under `style.STYLE`.
+        path: The file, ".png" or ".svg".
+    """
+    path = Path(path)
+    extension = path.suffix.removeprefix(".")
+    with mpl.rc_context(STYLE), atomic_path(path) as temporary:
+        figure.savefig(temporary, format=extension, dpi=DPI, metadata=_METADATA[extension])
+    figure.set_layout_engine(None)  # "none" would have every further format drawn twice

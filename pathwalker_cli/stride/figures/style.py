@@ -1,0 +1,148 @@
+"""One look for all figures: sizes, colours, line styles and axes of the gait cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Final, Literal
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from pathwalker_cli.conventions import Side
+from pathwalker_cli.stride.cycle import BOTH_SIDES, OwnCycle
+
+__all__ = [
+    "BODY_COLOUR",
+    "COLUMN",
+    "FORCE_COLOUR",
+    "FORCE_LENGTH",
+    "LINE_COLOUR",
+    "LINE_STYLE",
+    "MARKER",
+    "NEUTRAL",
+    "STYLE",
+    "TEXT",
+    "band_handle",
+    "dress",
+    "events_handle",
+    "legend",
+    "legend_panel",
+    "new_figure",
+    "percent_axis",
+    "side_handles",
+    "toe_off_line",
+    "zero_line",
+]
+
+COLUMN: Final = 3.35
+"""Width of every figure [in]: a column of a journal, 85 mm."""
+TEXT: Final = 7.0
+"""Size of all text [pt]; figures are printed as wide as they are drawn."""
+
+LINE_COLOUR: Final[dict[Side, str]] = {"right": "#0072B2", "left": "#D55E00"}
+"""Blue and vermilion of the palette by Okabe and Ito, told apart with any colour vision."""
+LINE_STYLE: Final[dict[Side, Literal["-", "--"]]] = {"right": "-", "left": "--"}
+"""Right solid, left dashed: sides differ without colour too."""
+MARKER: Final[dict[Side, Literal["o", "s"]]] = {"right": "o", "left": "s"}
+"""Right round, left square, for the same reason."""
+BODY_COLOUR: Final[dict[Side, str]] = {"right": "#222222", "left": "#8a8a8a"}
+"""Legs of a drawn walker; trunk and head are as dark as the right leg."""
+FORCE_COLOUR: Final = "#009E73"
+"""Ground reaction forces that are drawn as arrows."""
+FORCE_LENGTH: Final = 0.6
+"""Length of an arrow of one body weight, as a share of the pelvis height."""
+NEUTRAL: Final = "#555555"
+"""Grey of everything that belongs to no side."""
+
+STYLE: Final[dict[Any, Any]] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Arial", "Helvetica"],
+    "font.size": TEXT,
+    "axes.titlesize": TEXT,
+    "axes.labelsize": TEXT,
+    "xtick.labelsize": TEXT,
+    "ytick.labelsize": TEXT,
+    "legend.fontsize": TEXT,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.2,
+    "lines.dashed_pattern": (3.2, 1.4),
+    "figure.dpi": 100,
+    "svg.hashsalt": "pathwalker",
+    "svg.fonttype": "none",
+}
+"""Settings of Matplotlib under which figures are made and saved."""
+
+
+def new_figure(height: float) -> Figure:
+    """Return an empty figure of this height [in], as wide as a column."""
+    return Figure(figsize=(COLUMN, height), layout="constrained")
+
+
+def dress(ax: Axes, title: str = "", x: str = "", y: str = "") -> None:
+    """Give axes their title and labels and the common look of spines, ticks and grid.
+
+    The unit of y stands in a line of its own, since panels are low.
+    """
+    ax.set_title(title)
+    ax.set_xlabel(x)
+    ax.set_ylabel(y.replace(" [", "\n["))
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.tick_params(width=0.6, length=2.5)
+    ax.grid(visible=True, linewidth=0.4, color="#dddddd")
+    ax.set_axisbelow(True)
+
+
+def percent_axis(ax: Axes, label: str = "own gait cycle [%]") -> None:
+    """Let the x axis run over a gait cycle that begins with the side's own foot strike."""
+    ax.set_xlim(0.0, 100.0)
+    ax.set_xticks([0, 50, 100])
+    ax.set_xlabel(label)
+
+
+def toe_off_line(ax: Axes, cycle: OwnCycle) -> None:
+    """Mark the toe-off of a side, thin in the line style of the side."""
+    side = cycle.side
+    ax.axvline(cycle.toe_off, linewidth=0.6, color=LINE_COLOUR[side], linestyle=LINE_STYLE[side])
+
+
+def zero_line(ax: Axes) -> None:
+    """Draw the line y = 0."""
+    ax.axhline(0.0, color=NEUTRAL, linewidth=0.6)
+
+
+def side_handles() -> list[Artist]:
+    """Return the legend entries of the two sides."""
+    return [
+        Line2D([], [], color=LINE_COLOUR[s], linestyle=LINE_STYLE[s], label=s) for s in BOTH_SIDES
+    ]
+
+
+def events_handle() -> Artist:
+    """Return the legend entry of the toe-off marks."""
+    return Line2D([], [], color=NEUTRAL, linewidth=0.6, label="upright: toe-off")
+
+
+def band_handle() -> Artist:
+    """Return the legend entry of the recorded range."""
+    return Patch(facecolor="#bbbbbb", alpha=0.6, label="recorded:\nrange, mean")
+
+
+def legend(fig: Figure, handles: Iterable[Artist], columns: int = 2) -> None:
+    """Put one legend above all axes."""
+    fig.legend(handles=list(handles), loc="outside upper center", ncols=columns, **_LEGEND)
+
+
+def legend_panel(ax: Axes, handles: Iterable[Artist]) -> None:
+    """Let a panel that is not needed hold the legend of the figure."""
+    ax.axis("off")
+    place = (-0.35, 1.0)  # room that labels of an axis would have
+    box = ax.legend(handles=list(handles), loc="upper left", bbox_to_anchor=place, **_LEGEND)
+    box.set_in_layout(False)  # else all panels shrink with it
+
+
+_LEGEND: Final[dict[str, Any]] = {
+    "frameon": False, "handlelength": 2.0, "handletextpad": 0.6, "columnspacing": 1.2,
+}  # fmt: skip
