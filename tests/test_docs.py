@@ -45,7 +45,9 @@ FORBIDDEN = re.compile(
 )
 TOKEN = re.compile(r"@[A-Z][A-Z0-9_]*@")
 # A backticked name below the package, e.g. `model.muscle.activation_rate`.
-NAME = re.compile(r"`((?:model|ocp|output|inverse|io|conventions|config)(?:\.\w+)+)`")
+NAME = re.compile(
+    r"`((?:model|nlp|ocp|gait|stride|patient|inverse|io|conventions|config)(?:\.\w+)+)`"
+)
 
 
 def pages() -> list[Path]:
