@@ -75,7 +75,7 @@ CONFINED = {
     "dask_jobqueue": ("studies.batch.cluster",),
     "distributed": ("studies.batch.cluster",),
     "ezc3d": ("io",),
-    "pebble": ("studies.batch.local",),
+    "pebble": ("io.processes", "studies.batch.local"),
     "yaml": ("io",),
 }
 """Libraries and the parts of the package that may import them."""
