@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from multiprocessing.resource_tracker import ensure_running
 from typing import Any, Final, TypeVar
 
@@ -84,9 +84,10 @@ def ended_calls(
             with _blocked_sigint():  # asking whether a new pool is active makes it begin
                 if not pool.active:
                     break
-                while waiting and len(running) < count:
-                    number, arguments = waiting.popleft()
-                    running[pool.schedule(call, arguments, timeout=time_limit)] = number
+                with suppress(RuntimeError):  # it broke since it was asked
+                    while waiting and len(running) < count:
+                        future = pool.schedule(call, waiting[0][1], timeout=time_limit)
+                        running[future] = waiting.popleft()[0]
             for future in wait(running, GLANCE, FIRST_COMPLETED).done:
                 yield running.pop(future), future
     finally:
