@@ -86,8 +86,8 @@ def ended_calls(
                     break
                 with suppress(RuntimeError):  # it broke since it was asked
                     while waiting and len(running) < count:
-                        future = pool.schedule(call, waiting[0][1], timeout=time_limit)
-                        running[future] = waiting.popleft()[0]
+                        scheduled = pool.schedule(call, waiting[0][1], timeout=time_limit)
+                        running[scheduled] = waiting.popleft()[0]
             for future in wait(running, GLANCE, FIRST_COMPLETED).done:
                 yield running.pop(future), future
     finally:
