@@ -156,7 +156,7 @@ def _folders(folder: Path) -> list[Path]:
 def _keys_of_predictions() -> Iterator[str]:
     """Yield the keys of the config of a prediction, from its model."""
     from pathwalker_cli.config import StudyConfig
-    from pathwalker_cli.io.described import is_model
+    from pathwalker_cli.io.fields import is_model
 
     for name, field in StudyConfig.model_fields.items():
         block = field.annotation

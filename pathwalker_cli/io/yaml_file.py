@@ -13,8 +13,8 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from pathwalker_cli.errors import ConfigError, InputError
+from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.io.refusals import KeyPath, Lines, dotted, place, sentence
-from pathwalker_cli.io.special import refuse_special
 
 __all__ = ["KeyPath", "Lines", "load_yaml", "read_mapping", "validate", "yaml_text"]
 

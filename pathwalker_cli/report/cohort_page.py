@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Final
 
 from pathwalker_cli.conventions import SIDES, to_degrees
+from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
-from pathwalker_cli.report.csv_table import number, read_rows
 from pathwalker_cli.studies.batch.ledger import CASES, TABLE
 from pathwalker_cli.studies.batch.table import CONVERGED, PENDING, read_metrics
 

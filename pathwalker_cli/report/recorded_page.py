@@ -12,9 +12,9 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.inverse.recorded_read import read_trials
 from pathwalker_cli.inverse.recorded_study import ORIGIN
+from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
-from pathwalker_cli.report.csv_table import number, read_rows
 from pathwalker_cli.report.figures import torque_drawing
 
 __all__ = ["recorded_page"]

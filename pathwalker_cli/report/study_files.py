@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pathwalker_cli.report.csv_table import read_rows
+from pathwalker_cli.io.csv_file import read_rows
 from pathwalker_cli.report.folders import Study
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
 from pathwalker_cli.studies.measures import MEASURES, measure_of

@@ -12,7 +12,7 @@ from typing import Any, Final
 from jinja2 import Environment
 from pydantic import BaseModel
 
-from pathwalker_cli.io.described import described, field_at
+from pathwalker_cli.io.fields import described, field_at
 from pathwalker_cli.io.templates import templates
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import OrthosisData

@@ -16,7 +16,7 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.cost_terms import cost_terms
 from pathwalker_cli.gait.goal_costs import goal_values
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.io.special import refuse_special
+from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
