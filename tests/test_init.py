@@ -27,7 +27,7 @@ from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient
 from pathwalker_cli.starter import example
 from pathwalker_cli.starter.child import made_child
-from pathwalker_cli.starter.comments import WIDTH
+from pathwalker_cli.starter.configs import WIDTH
 from pathwalker_cli.starter.files import explained_keys, folder_files, next_steps
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.landscape.study import LandscapeStudy
