@@ -62,7 +62,6 @@ CONFINED = {
         "evaluation.figures",
         "report.figures",
         "reproduce.figures",
-        "reproduce.muscle_figures",
         "studies.landscape.figures",
         "studies.sensitivity.figures",
         "studies.perturbation.figures",

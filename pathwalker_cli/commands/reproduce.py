@@ -47,8 +47,7 @@ def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, qui
     all converged, 1 some problem did not, 2 bad input.
     """
     from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.reproduce.pipeline import PAGE, reproduce
-    from pathwalker_cli.reproduce.plan import ENTRIES
+    from pathwalker_cli.reproduce.pipeline import ENTRIES, PAGE, reproduce
     from pathwalker_cli.studies.base import claimed_folder
 
     def say(line: str) -> None:
