@@ -21,6 +21,7 @@ __all__ = [
     "field_at",
     "invalid",
     "is_model",
+    "quantity_at",
     "side_type",
 ]
 
@@ -195,3 +196,13 @@ def field_at(model: type[BaseModel], place: str) -> FieldInfo:
     if issubclass(inner, Sides):
         inner = inner.model_fields["right"].annotation
     return field_at(inner, rest)
+
+
+def quantity_at(model: type[BaseModel], place: str) -> Quantity:
+    """Return unit and range of the number at a dotted place below a model."""
+    field = field_at(model, place)
+    inside: Any = field.annotation
+    metadata = list(field.metadata)
+    if is_model(inside):
+        metadata += get_args(side_type(inside))[1:]
+    return next(entry for entry in metadata if isinstance(entry, Quantity))

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SUFFIX, Side, to_degrees
 from pathwalker_cli.evaluation.figures import ankle_figure, ground_force_figure, joint_angle_figure
 from pathwalker_cli.evaluation.traces import Trace, lone_trace
-from pathwalker_cli.model.muscle import generators
+from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.reproduce.results import ProblemResult, Results
 from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
 from pathwalker_cli.stride.figures import orthosis_curves
