@@ -23,7 +23,7 @@ from rich.console import Console
 from conftest import MadeSolution
 from fake_work import die, fake_work
 from pathwalker_cli.cli import cli
-from pathwalker_cli.commands.batch_progress import BatchProgress
+from pathwalker_cli.commands.progress import BatchProgress
 from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
 from pathwalker_cli.io import processes

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs, complete_problems, set_option
-from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.complete import complete_configs, complete_problems
+from pathwalker_cli.commands.options import json_option, print_json, set_option
 
 if TYPE_CHECKING:
     from pathwalker_cli.checking.report import Checked

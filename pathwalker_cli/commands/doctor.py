@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.options import json_option, print_json
 
 __all__ = ["Finding", "doctor_command", "findings"]
 

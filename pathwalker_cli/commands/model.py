@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from pathwalker_cli.commands.complete import complete_patients
+from pathwalker_cli.commands.options import out_option
 
 if TYPE_CHECKING:
     from pathwalker_cli.conventions import Condition
@@ -25,9 +26,7 @@ __all__ = ["model_command"]
     type=click.Choice(["barefoot", "orthosis"]),
     help="What is worn: nothing, or shoes and orthoses.",
 )
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="File; else stdout."
-)
+@out_option("File; else stdout.", "-o", metavar="FILE")
 @click.option(
     "--published", is_flag=True, help="Keep the published model's misplaced right forearm and hand."
 )

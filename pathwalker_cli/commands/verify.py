@@ -8,8 +8,14 @@ from pathlib import Path
 
 import click
 
-from pathwalker_cli.commands.complete import complete_runs, runs_argument
-from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.options import (
+    json_option,
+    out_option,
+    print_json,
+    quiet_option,
+    runs_argument,
+)
 
 __all__ = ["rerun_command", "verify_command"]
 
@@ -60,13 +66,8 @@ def verify_command(context: click.Context, runs: tuple[Path, ...], as_json: bool
 
 @click.command("rerun")
 @click.argument("run", metavar="RUN", type=click.Path(path_type=Path), shell_complete=complete_runs)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Run folder; RUN-again if left out. An earlier run in it is replaced.",
-)
-@click.option("--quiet", is_flag=True, help="Print errors only.")
+@out_option("Run folder; RUN-again if left out. An earlier run in it is replaced.")
+@quiet_option
 def rerun_command(run: Path, out: Path | None, quiet: bool) -> None:
     """Solve RUN again from its folder alone, and tell how the two differ.
 
