@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.checking.prediction import described, ready_solver, walker_rows
+from pathwalker_cli.checking.patient import walker_rows
+from pathwalker_cli.checking.prediction import described, ready_solver
 from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import STIFFNESSES

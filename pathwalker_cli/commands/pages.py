@@ -24,8 +24,7 @@ def report_command(runs: tuple[Path, ...], out: Path) -> None:
     """
     from pathwalker_cli.errors import DataError
     from pathwalker_cli.io.atomic import check_output, write_text
-    from pathwalker_cli.report.build import page_of
-    from pathwalker_cli.report.html import page_html
+    from pathwalker_cli.report.html import page_html, page_of
 
     if out.suffix not in (".html", ".htm"):
         raise DataError("is no name of a page", where=f"--out {out}", allowed="FILE.html")

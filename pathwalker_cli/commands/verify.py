@@ -80,7 +80,7 @@ def rerun_command(run: Path, out: Path | None, quiet: bool) -> None:
     from pathwalker_cli.results.run_folder import claimed_run, load_run, repeatable_config
     from pathwalker_cli.results.solve_text import failure_text
     from pathwalker_cli.studies.run import run_study
-    from pathwalker_cli.verification.again import difference_lines
+    from pathwalker_cli.verification.text import difference_lines
 
     before = load_run(run, allow_unconverged=True)
     folder = out or run.with_name(f"{run.resolve().name}-again")
