@@ -52,8 +52,8 @@ def check_kinematics(path: str, changes: Changes = ()) -> Checked:
     config = load_inverse_kinematics(path, changes)
     with placed(path):
         patient = load_patient(config.patient)
-        found = _c3d(config, patient)
-    return _recorded_study(path, "inverse kinematics", patient, found, "C3D files")
+        trials = _c3d(config, patient)
+    return _recorded_study(path, "inverse kinematics", patient, trials, "C3D files")
 
 
 def check_dynamics(path: str, changes: Changes = ()) -> Checked:
@@ -63,24 +63,24 @@ def check_dynamics(path: str, changes: Changes = ()) -> Checked:
         patient = load_patient(config.patient)
         require_trials(config, patient)
         if config.source == "c3d":
-            found = _c3d(config, patient)
-            return _recorded_study(path, "inverse dynamics", patient, found, "C3D files")
-        found = {c: list(recording_names(patient, c)) for c in config.conditions}
+            trials = _c3d(config, patient)
+            return _recorded_study(path, "inverse dynamics", patient, trials, "C3D files")
+        trials = {c: list(recording_names(patient, c)) for c in config.conditions}
         for condition in config.conditions:
-            for name in found[condition]:
+            for name in trials[condition]:
                 read_recording(patient, condition, name)
     return _recorded_study(
-        path, "inverse dynamics", patient, found, "recordings beside the patient"
+        path, "inverse dynamics", patient, trials, "recordings beside the patient"
     )
 
 
 def check_markers(path: str, changes: Changes = ()) -> Checked:
     """Return what a marker set holds."""
     _require_none(changes, path)
-    found: MarkerSet = load_marker_set(path)
+    marker_set: MarkerSet = load_marker_set(path)
     with placed(path):
         patient = load_patient("sreenivasa2017-patient")
-        points = {c: marker_points(found, patient, c) for c in CONDITIONS}
+        points = {c: marker_points(marker_set, patient, c) for c in CONDITIONS}
     rows: list[Row] = []
     for condition, own in points.items():
         markers = list(dict.fromkeys(point.marker for point in own))
@@ -116,9 +116,11 @@ def check_patient_file(path: str, changes: Changes = ()) -> Checked:
 def check_orthosis(path: str, changes: Changes = ()) -> Checked:
     """Return what an orthosis is."""
     _require_none(changes, path)
-    found = load_yaml(path, OrthosisData, ConfigError)
-    content = {"orthosis": found.model_dump(mode="json")}
-    return Checked(path, "orthosis", tuple(orthosis_rows(found)), content, (*odd_orthosis(found),))
+    orthosis = load_yaml(path, OrthosisData, ConfigError)
+    content = {"orthosis": orthosis.model_dump(mode="json")}
+    return Checked(
+        path, "orthosis", tuple(orthosis_rows(orthosis)), content, (*odd_orthosis(orthosis),)
+    )
 
 
 def _require_none(changes: Changes, path: str) -> None:
@@ -134,23 +136,23 @@ def _require_none(changes: Changes, path: str) -> None:
 def _c3d(config: RecordedConfig, patient: Patient) -> dict[str, list[str]]:
     """Return the C3D files of a study by condition, each looked into."""
     markers = load_marker_set(config.markers)
-    found: dict[str, list[str]] = {}
+    trials: dict[str, list[str]] = {}
     with placed("c3d"):
         files = {c: c3d_files(config.c3d.of(c)) for c in config.recorded_conditions}
     for condition, paths in files.items():
         names = [point.marker for point in marker_points(markers, patient, condition)]
         for file in paths:
             checked_recording(file, names, patient.height)
-        found[condition] = [file.stem for file in paths]
-    return found
+        trials[condition] = [file.stem for file in paths]
+    return trials
 
 
 def _recorded_study(
-    path: str, kind: str, patient: Patient, found: dict[str, list[str]], where: str
+    path: str, kind: str, patient: Patient, trials: dict[str, list[str]], where: str
 ) -> Checked:
     rows = [*patient_rows(patient)]
-    rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in found.items() if n]
-    content: dict[str, Any] = {"patient": patient_content(patient), "trials": found}
+    rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in trials.items() if n]
+    content: dict[str, Any] = {"patient": patient_content(patient), "trials": trials}
     return Checked(path, kind, tuple(rows), content, patient_remarks(patient))
 
 
@@ -225,17 +227,17 @@ def another_kind(path: str, kind: str) -> ConfigError | None:
         kind: The kind that it is not accepted as.
     """
     try:
-        found = _kind_of(path)
+        actual = _kind_of(path)
     except ConfigError:
         return None
-    if found == kind:
+    if actual == kind:
         return None
-    a = "an" if found[0] in "aeiou" else "a"
+    a = "an" if actual[0] in "aeiou" else "a"
     return ConfigError(
-        f"is {a} {found} file",
+        f"is {a} {actual} file",
         where=path,
         allowed=f"a file for {KINDS[kind].taken_by}",
-        mend=f"this file is for {KINDS[found].taken_by}",
+        mend=f"this file is for {KINDS[actual].taken_by}",
     )
 
 
@@ -263,10 +265,10 @@ def _kind(mapping: Mapping[str, Any], source: Path, where: str) -> str:
         return str(mapping["study"])
     known = {name: len(mapping.keys() & _keys(model)) for name, (model, _, _) in KINDS.items()}
     most = max(known.values())
-    found = [name for name, count in known.items() if count == most]
-    named = [name for name in found if name in source.stem]
-    if len(named) == 1 or len(found) == 1:
-        return (named or found)[0]
+    likely = [name for name, count in known.items() if count == most]
+    named = [name for name in likely if name in source.stem]
+    if len(named) == 1 or len(likely) == 1:
+        return (named or likely)[0]
     shown = ", ".join(mapping) or "none"
     raise ConfigError(
         f"its keys ({shown}) do not tell what it is",

@@ -79,10 +79,10 @@ def strength_shares(patient: Patient) -> dict[str, tuple[float, ...]]:
     """Return strengths as shares of a healthy child's of the same size: right and left, or one."""
     if patient.strengths is None:
         return {}
-    found = {}
+    shares = {}
     for name in Strengths.model_fields:
         given = getattr(patient.strengths, name)
         values = (given,) if isinstance(given, float) else (given.right, given.left)
         whole = healthy_strength(name, patient.body_mass, patient.height)
-        found[name] = tuple(round(value / whole, 3) for value in values)
-    return found
+        shares[name] = tuple(round(value / whole, 3) for value in values)
+    return shares

@@ -118,9 +118,9 @@ def check_batch(path: str, changes: Changes = ()) -> Checked:
     notes: list[str] = []
     seconds = 0.0
     for case in batch.cases:
-        found = described(ready_solver(case.config, f"{path}, case {case.name}"), path)
-        seconds += found.content["expected_seconds"]["likely"]
-        notes += [note for note in found.notes if note not in notes]
+        checked = described(ready_solver(case.config, f"{path}, case {case.name}"), path)
+        seconds += checked.content["expected_seconds"]["likely"]
+        notes += [note for note in checked.notes if note not in notes]
     patients = list(dict.fromkeys(case.patient for case in batch.cases))
     problems = list(dict.fromkeys(case.problem for case in batch.cases))
     rows: list[Row] = [

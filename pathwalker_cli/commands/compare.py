@@ -36,20 +36,20 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
 
     if len(runs) < 2:
         raise DataError("is one run", where=str(runs[0]), allowed="two runs or more")
-    found = compare_runs(runs)
+    comparison = compare_runs(runs)
     if out is not None:
-        _write(out, found)
+        _write(out, comparison)
     if as_json:
-        print_json(comparison_content(found))
+        print_json(comparison_content(comparison))
         return
-    click.echo("\n".join(comparison_lines(found)))
-    for note in found.notes:
+    click.echo("\n".join(comparison_lines(comparison)))
+    for note in comparison.notes:
         click.echo(fill(f"note: {note}", 80, subsequent_indent="      "))
     if out is not None:
         click.echo(f"\nWritten to {out}")
 
 
-def _write(out: Path, found: Comparison) -> None:
+def _write(out: Path, comparison: Comparison) -> None:
     """Write tables and figures, all or none."""
     from pathwalker_cli.evaluation.figures import save_overlays
     from pathwalker_cli.evaluation.traces import traces
@@ -58,9 +58,9 @@ def _write(out: Path, found: Comparison) -> None:
     from pathwalker_cli.report.compare_text import comparison_content, write_comparison_csv
 
     with staged_folder(out) as folder:
-        write_json(folder / "compare.json", comparison_content(found))
-        write_comparison_csv(folder / "compare.csv", found)
-        save_overlays(traces(found.gaits, found.names), folder / "figures")
+        write_json(folder / "compare.json", comparison_content(comparison))
+        write_comparison_csv(folder / "compare.csv", comparison)
+        save_overlays(traces(comparison.gaits, comparison.names), folder / "figures")
 
 
 @click.command("evaluate")

@@ -72,13 +72,13 @@ def complete_runs(
     For `report`, all folders count that a page can be made of.
     """
     wanted = _is_reported if context.info_name == "report" else _is_run
-    found = []
+    offered = []
     for path in _paths(begun, ()):
         if wanted(Path(path)):
-            found.append(path.removesuffix("/"))
+            offered.append(path.removesuffix("/"))
         elif _holds(Path(path), wanted):
-            found.append(path)
-    return _items(found)
+            offered.append(path)
+    return _items(offered)
 
 
 def complete_keys(

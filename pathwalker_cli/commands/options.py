@@ -96,8 +96,7 @@ def print_json(content: Mapping[str, Any]) -> None:
 def print_failure(context: click.Context, sentence: str) -> None:
     """Print a document about a solve that did not converge, unless the command printed its own."""
     if context.meta.get(_WANTED) and not context.meta.get(_PRINTED):
-        with context:
-            print_json({"status": "not converged", "converged": False, "message": sentence})
+        print_json({"status": "not converged", "converged": False, "message": sentence})
 
 
 @contextmanager

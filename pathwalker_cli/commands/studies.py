@@ -39,7 +39,7 @@ _EVERY: Final = 10
 
 
 @dataclass(frozen=True)
-class _Call:
+class StudyCall:
     """A study as it was called.
 
     Args:
@@ -134,7 +134,7 @@ Command = Callable[..., Any]
 
 def _study(
     name: str, out: str = "", *more: Callable[[Command], Command]
-) -> Callable[[Callable[[_Call], None]], Command]:
+) -> Callable[[Callable[[StudyCall], None]], Command]:
     """Return what makes a command of a function: argument and options of a study.
 
     Args:
@@ -165,10 +165,10 @@ def _study(
         *more,
     )
 
-    def decorate(function: Callable[[_Call], None]) -> Command:
+    def decorate(function: Callable[[StudyCall], None]) -> Command:
         @wraps(function)
         def call(**words: Any) -> None:
-            function(_Call(**words))
+            function(StudyCall(**words))
 
         command: Command = call
         for option in reversed(options):
@@ -179,7 +179,7 @@ def _study(
 
 
 @_study("perturb", "perturbation")
-def perturb_command(call: _Call) -> None:
+def perturb_command(call: StudyCall) -> None:
     """Move every orthosis spring a little from its optimum and solve all the rest again.
 
     CONFIG is a YAML file or the name of a shipped one (perturbation). Changes of cost, crouch,
@@ -217,7 +217,7 @@ def perturb_command(call: _Call) -> None:
 
 
 @_study("sensitivity")
-def sensitivity_command(call: _Call) -> None:
+def sensitivity_command(call: StudyCall) -> None:
     """Tell what one percent of every number would change, without solving again.
 
     CONFIG is a YAML file or the name of a shipped one (sensitivity). Springs, orthosis, strengths,
@@ -253,7 +253,7 @@ def sensitivity_command(call: _Call) -> None:
         help="Processes that solve; as many as there are cores if left out. Results are the same.",
     ),
 )
-def uncertainty_command(call: _Call) -> None:
+def uncertainty_command(call: StudyCall) -> None:
     """Draw the uncertain numbers of a patient and identify the springs anew for every draw.
 
     CONFIG is a YAML file or the name of a shipped one (uncertainty): what is uncertain, and by how
@@ -306,7 +306,7 @@ def _counted(total: int, say: Callable[[str], None]) -> Callable[[Solved], None]
 
 
 @_study("landscape")
-def landscape_command(call: _Call) -> None:
+def landscape_command(call: StudyCall) -> None:
     """Map the cost over K_D and K_P of a side, as CONFIG says, and the region of nearly best ones.
 
     CONFIG is a YAML file or the name of a shipped one. Every point is solved from its neighbours,
@@ -328,7 +328,7 @@ def landscape_command(call: _Call) -> None:
 
 
 @_study("tradeoff")
-def tradeoff_command(call: _Call) -> None:
+def tradeoff_command(call: StudyCall) -> None:
     """Find the front of effort per distance and walking speed, as CONFIG says.
 
     CONFIG is a YAML file or the name of a shipped one. The problem is solved for a chain of weights

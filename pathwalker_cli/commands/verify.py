@@ -38,7 +38,7 @@ def verify_command(context: click.Context, runs: tuple[Path, ...], as_json: bool
     from pathwalker_cli.verification.folders import runs_in, verify_table
     from pathwalker_cli.verification.text import verification_lines
 
-    found: list[Verification] = []
+    verifications: list[Verification] = []
     refused: list[PathwalkerError] = []
     steps: list[Callable[[], Verification | None]]
     steps = [partial(verify_table, folder) for folder in runs]
@@ -51,13 +51,13 @@ def verify_command(context: click.Context, runs: tuple[Path, ...], as_json: bool
             click.echo(f"Error: {error}", err=True)
             continue
         if verification is not None:
-            found.append(verification)
+            verifications.append(verification)
             if not as_json:
                 click.echo("\n".join(verification_lines(verification)) + "\n")
     if as_json:
-        verified = [each.as_dict() for each in found]
+        verified = [each.as_dict() for each in verifications]
         print_json({"runs": verified, "refused": [str(error) for error in refused]})
-    failed = [str(each.folder) for each in found if not each.passed]
+    failed = [str(each.folder) for each in verifications if not each.passed]
     if failed:
         click.echo(f"Error: {', '.join(failed)}: a check failed", err=True)
     damaged = any(not isinstance(error, NotConvergedError) for error in refused)

@@ -75,8 +75,8 @@ def read_mapping(
     """
     content, lines = _content(_text(Path(path), error), str(path), error)
     if not isinstance(content, dict):
-        found = "nothing" if content is None else f"a {type(content).__name__}"
-        raise error(f"holds {found}", where=str(path), allowed="keys with values ('key: value')")
+        kind = "nothing" if content is None else f"a {type(content).__name__}"
+        raise error(f"holds {kind}", where=str(path), allowed="keys with values ('key: value')")
     return content, lines
 
 
@@ -225,9 +225,9 @@ def _not_finite(value: Any, prefix: KeyPath = ()) -> KeyPath:
     elif isinstance(value, float) and not math.isfinite(value):
         return prefix
     for key, item in items:
-        found = _not_finite(item, (*prefix, key))
-        if found:
-            return found
+        path = _not_finite(item, (*prefix, key))
+        if path:
+            return path
     return ()
 
 

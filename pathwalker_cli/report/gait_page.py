@@ -101,25 +101,25 @@ def _springs(run: ReportRun) -> str:
 
 def _warnings(runs: Sequence[ReportRun]) -> list[str]:
     """Return what must be known before the answer is used."""
-    found = []
+    warnings = []
     for run in runs:
         if run.run.config.smoke:
-            found.append(
+            warnings.append(
                 f"{run.label}: a quick check on a coarse mesh: numbers for orientation only"
             )
         if run.verdict is not None and (warning := snapped_warning(run.verdict)):
-            found.append(f"{run.label}, springs to take: {warning}")
+            warnings.append(f"{run.label}, springs to take: {warning}")
         if _coarse(run):
-            found.append(
+            warnings.append(
                 f"{run.label}: an independent integrator misses the mesh by more than the config "
                 "asks for: the mesh is too coarse"
             )
         if run.patient_changed:
-            found.append(
+            warnings.append(
                 f"{run.label}: the patient's file is no longer that of the run; age, mass, height "
                 "and forces per weight are those of today's file"
             )
-    return found
+    return warnings
 
 
 def _coarse(run: ReportRun) -> bool:

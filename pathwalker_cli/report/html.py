@@ -60,12 +60,12 @@ def page_of(folders: Sequence[Path]) -> Page:
     Raises:
         DataError: If a folder cannot be used, or they do not go together.
     """
-    found = sorted_folders(folders)
-    if "recorded" in found:
-        return recorded_page(found["recorded"])
-    if "cohort" in found:
-        return cohort_page(found["cohort"])
-    runs = read_runs(found["run"])
-    named = {kind: places for kind, places in found.items() if kind in STUDIES}
+    by_kind = sorted_folders(folders)
+    if "recorded" in by_kind:
+        return recorded_page(by_kind["recorded"])
+    if "cohort" in by_kind:
+        return cohort_page(by_kind["cohort"])
+    runs = read_runs(by_kind["run"])
+    named = {kind: places for kind, places in by_kind.items() if kind in STUDIES}
     near = studies_near([(run.run.folder, run.run.metrics) for run in runs], named)
     return gait_page(runs, near)

@@ -151,15 +151,15 @@ def _same_table(path: Path, expected: Path) -> Check:
     if not path.is_file():
         raise DataError("is missing", where=str(path), mend="solve again")
     try:
-        found = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+        cells = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
     except (OSError, UnicodeDecodeError):
         raise DataError("is damaged", where=str(path), mend="solve again") from None
     wanted = [line.split(",") for line in expected.read_text(encoding="utf-8").splitlines()]
-    if [len(row) for row in found] != [len(row) for row in wanted] or found[:1] != wanted[:1]:
+    if [len(row) for row in cells] != [len(row) for row in wanted] or cells[:1] != wanted[:1]:
         return Check(path.name, math.inf, _SAME, "relative", "has other rows or columns")
     worst, place = 0.0, ""
     scale = _column_scales(wanted)
-    for i, (mine, other) in enumerate(zip(found[1:], wanted[1:], strict=True), start=2):
+    for i, (mine, other) in enumerate(zip(cells[1:], wanted[1:], strict=True), start=2):
         for j, (one, two) in enumerate(zip(mine, other, strict=True)):
             difference = 0.0 if one == two else _difference(one, two, scale[j])
             if difference > worst:
@@ -261,12 +261,12 @@ def _dynamics(
         ("velocity", errors.worst_velocity, mesh.velocity_tolerance, "rad/s or m/s"),
     ):
         yield Check(f"re-integrated {name}", error if refined else None, limit, unit, note)
-    found = balance(series)
+    balances = balance(series)
     shares = (
-        ("work against energy", found.energy / found.work_scale, _ENERGY),
-        ("work of the ground", found.contact_work / found.work_scale, _ENERGY),
-        ("impulse against momentum", found.impulse / found.impulse_scale, _MOMENTUM),
-        ("angular impulse", found.angular_impulse / found.angular_scale, _MOMENTUM),
+        ("work against energy", balances.energy / balances.work_scale, _ENERGY),
+        ("work of the ground", balances.contact_work / balances.work_scale, _ENERGY),
+        ("impulse against momentum", balances.impulse / balances.impulse_scale, _MOMENTUM),
+        ("angular impulse", balances.angular_impulse / balances.angular_scale, _MOMENTUM),
     )
     for name, share, limit in shares:
         yield Check(name, share if refined else None, limit, "share", note)
@@ -289,12 +289,12 @@ def _solution(run: Run, solver: GaitSolver) -> Iterator[Check]:
     ):
         yield Check("optimality", math.inf, 0.0, "", "multipliers of another program")
         return
-    found, tolerances = optimality(program, unknowns, run.multipliers), run.config.solver
+    conditions, tolerances = optimality(program, unknowns, run.multipliers), run.config.solver
     tolerance = _SLACK * tolerances.tolerance
     # rounding of a motion that is written and read
     met = _SLACK * tolerances.constraint_tolerance
     scale = max(1.0, float(np.abs(unknowns).max()))
-    yield Check("rows and bounds", found.infeasibility / scale, met, "solver units")
-    yield Check("stationarity", found.stationarity, tolerance, "solver units")
-    yield Check("complementarity", found.complementarity, tolerance, "solver units")
-    yield Check("signs of multipliers", found.wrong_sign, tolerance, "solver units")
+    yield Check("rows and bounds", conditions.infeasibility / scale, met, "solver units")
+    yield Check("stationarity", conditions.stationarity, tolerance, "solver units")
+    yield Check("complementarity", conditions.complementarity, tolerance, "solver units")
+    yield Check("signs of multipliers", conditions.wrong_sign, tolerance, "solver units")
