@@ -165,7 +165,7 @@ def _stoppable() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         raise KeyboardInterrupt
 
-    # a command that runs in the background stays deaf, and only the main thread may ask
+    # a command that runs in the background does not hear it, and only the main thread may ask
     main = threading.current_thread() is threading.main_thread()
     if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield stopped

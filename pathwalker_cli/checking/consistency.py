@@ -1,4 +1,4 @@
-"""Values that are allowed one by one and make no sense together.
+"""Values that are allowed one by one and contradict each other, or are unusual.
 
 What is certain to fail is refused; what is merely unusual becomes a note.
 """

@@ -50,9 +50,9 @@ def check_sensitivity(path: str, changes: Changes = ()) -> Checked:
     """Return what `sensitivity` would do."""
     study = load_study(path, SensitivityStudy, changes)
     solver = _base(study, path)
-    patient, worn = solver.walker.patient, solver.walker.orthosis is not None
+    patient, with_orthosis = solver.walker.patient, solver.walker.orthosis is not None
     with placed(path):
-        places = asked_places(study, solver.free, patient, worn)
+        places = asked_places(study, solver.free, patient, with_orthosis)
         for place in places[len(solver.free) :]:
             _check_place(place, patient)
     solves = 2 * len(study.check)

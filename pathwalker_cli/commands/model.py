@@ -40,13 +40,13 @@ def model_command(patient: str, condition: str, out: Path | None, published: boo
     from pathwalker_cli.model.urdf import urdf_text
     from pathwalker_cli.patient import load_patient
 
-    who, worn = load_patient(patient), cast("Condition", condition)
-    text = urdf_text(who, worn, published)
+    who, chosen = load_patient(patient), cast("Condition", condition)
+    text = urdf_text(who, chosen, published)
     if out is None:
         click.echo(text, nl=False)
     else:
         write_text(out, text)
-    for line in _summary(who, worn, segments(who, worn, published)):
+    for line in _summary(who, chosen, segments(who, chosen, published)):
         click.echo(line, err=True)
 
 

@@ -100,11 +100,9 @@ def _page(runs: tuple[Path, ...], out: Path) -> None:
     """Write a page."""
     from pathwalker_cli.animation.frames import run_frames
     from pathwalker_cli.animation.html import RATE, html_page
-    from pathwalker_cli.io.atomic import output_path
+    from pathwalker_cli.io.atomic import write_text
 
-    page = html_page(run_frames(runs, RATE))
-    with output_path(out) as file:
-        file.write_text(page, encoding="utf-8", newline="")
+    write_text(out, html_page(run_frames(runs, RATE)))
 
 
 def _film(runs: tuple[Path, ...], out: Path, strides: int, fps: float, slow: float) -> None:

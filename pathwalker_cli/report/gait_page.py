@@ -29,8 +29,8 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
         studies: Studies around one of them.
     """
     patient, changes = runs[0].patient, changes_of(runs)
-    worn = [run for run in runs if run.worn]
-    sections = [spring_section(run) for run in worn]
+    with_orthoses = [run for run in runs if run.worn]
+    sections = [spring_section(run) for run in with_orthoses]
     sections += [gait_section(runs, changes), curve_section(runs)]
     sections += [study_section(study, _base(study, runs)) for study in studies]
     sections.append(assumption_section(runs))
@@ -41,7 +41,7 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
         Fact("Height", f"{patient.height:g} m"),
         *_of_runs(runs),
     )
-    answer = " ".join(_answer(run, changes) for run in worn or runs)
+    answer = " ".join(_answer(run, changes) for run in with_orthoses or runs)
     return Page(f"Gait of {patient.id}", facts, answer, tuple(_warnings(runs)), tuple(sections))
 
 

@@ -225,5 +225,5 @@ def _chance(spreads: Spreads, spread: Spread) -> str:
     parts = [(spread.upper, f"the stiffest ({high:g} N m/rad)"),
              (spread.lower, f"the softest ({low:g} N m/rad)"),
              (inside, "one between")]  # fmt: skip
-    told = ", ".join(f"{words} in {100 * share:.0f} %" for share, words in parts if share > 0.0)
-    return f"{label}: least effort takes {told} of the draws."
+    shares = ", ".join(f"{words} in {100 * share:.0f} %" for share, words in parts if share > 0.0)
+    return f"{label}: least effort takes {shares} of the draws."
