@@ -91,18 +91,17 @@ def test_fast_torques_are_those_of_the_walker(solver: GaitSolver) -> None:
 
 def test_no_row_and_no_unknown_is_constrained_twice(program: CollocationProgram) -> None:
     """The Jacobian of equalities and fixed unknowns has full rank at a random point."""
-    nlp = program.program
-    x = 0.3 * np.random.default_rng(1).normal(size=nlp.size)
-    lower, upper = program.bounds
-    jacobian = np.asarray(ca.DM(nlp.functions()["jac_g"](x, program.parameters)[1]))
-    equal = jacobian[nlp.lower == nlp.upper][:, lower < upper]
+    x = 0.3 * np.random.default_rng(1).normal(size=program.size)
+    (lower, upper), (low, high) = program.bounds, program.row_bounds
+    jacobian = np.asarray(ca.DM(program.functions["jac_g"](x, program.parameters)[1]))
+    equal = jacobian[low == high][:, lower < upper]
     values = np.linalg.svd(equal / np.linalg.norm(equal, axis=1)[:, None], compute_uv=False)
     assert values[-1] > 1e-9
     assert equal.shape[0] < equal.shape[1]
 
 
 def test_motion_and_unknowns_are_inverse(program: CollocationProgram) -> None:
-    x = np.random.default_rng(4).normal(size=program.program.size)
+    x = np.random.default_rng(4).normal(size=program.size)
     assert program.to_unknowns(program.to_motion(x)) == pytest.approx(x, abs=1e-12)
 
 
@@ -110,7 +109,7 @@ def test_multipliers_carry_over_unchanged_to_the_same_mesh(program: CollocationP
     from pathwalker_cli.nlp.ipopt import Multipliers
 
     rng = np.random.default_rng(6)
-    before = Multipliers(np.zeros(program.program.size), rng.normal(size=program.program.rows))
+    before = Multipliers(np.zeros(program.size), rng.normal(size=program.rows))
     after = transferred(program, before, program)
     assert after.rows == pytest.approx(before.rows, abs=1e-12)
 

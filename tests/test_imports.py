@@ -15,7 +15,10 @@ PACKAGE = Path(pathwalker_cli.__file__).parent
 ROOT = "pathwalker_cli"
 
 LAYERS = (
-    {"conventions", "errors", "paths", "versions"},
+    {"errors", "paths"},
+    {"nlp"},
+    {"ocp"},
+    {"conventions", "versions"},
     {"trajectory"},
     {"io"},
     {"patient.blocks", "patient.proportions"},
@@ -24,9 +27,6 @@ LAYERS = (
     {"model"},
     {"problems", "patient.variation", "gait.goals"},
     {"config"},
-    {"nlp.frozen"},
-    {"ocp.problem", "ocp.phased"},
-    {"ocp", "nlp"},
     {"stride"},
     {"gait", "inverse", "ocp.solve"},
     {"results"},
@@ -45,7 +45,6 @@ CONFINED = {
     "casadi": ("model", "nlp", "ocp", "stride", "gait", "commands.doctor"),
     "pinocchio": (
         "model",
-        "nlp",
         "gait",
         "inverse",
         "stride",

@@ -56,13 +56,13 @@ class Neighbourhood:
     @property
     def springs(self) -> tuple[str, ...]:
         """Names of the stiffnesses that the problem is free to choose."""
-        places = list(self.optimum.program.layout.parameters)
+        places = list(self.optimum.program.free_parameters)
         return tuple(STIFFNESSES[places.index(place)] for place in self.kkt.free)
 
     @cached_property
     def _scale(self) -> np.ndarray:
         """Stiffness [N m/rad] per solver unit of every free spring."""
-        return np.asarray(self.optimum.program.layout.scale[self.kkt.free])
+        return np.asarray(self.optimum.program.scale[self.kkt.free])
 
     @cached_property
     def cost_gradient(self) -> np.ndarray:

@@ -28,18 +28,15 @@ from pathwalker_cli.gait.start import ReferenceStride, reference_stride, start_r
 from pathwalker_cli.gait.structures import gait_blocks
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
+from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
+from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers, Sample
+from pathwalker_cli.ocp.violations import active_bounds, largest_violations
 from pathwalker_cli.stride.series import gait_series
-from pathwalker_cli.stride.verify import (
-    Reintegration,
-    active_bounds,
-    largest_violations,
-    reintegrate,
-)
+from pathwalker_cli.stride.verify import Reintegration, reintegrate
 
 __all__ = ["GaitSolver", "solve_study"]
 
@@ -195,7 +192,7 @@ class GaitSolver:
             name,
             result.status,
             motion.intervals,
-            program.program.size,
+            program.size,
             result.iterations,
             result.seconds,
             result.seconds_functions,

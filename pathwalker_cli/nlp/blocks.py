@@ -14,10 +14,9 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.nlp.assembly import KINDS, Assembly, Part, Source
+from pathwalker_cli.nlp.assembly import KINDS, Assembly, Part, Source, mapped_functions
 from pathwalker_cli.nlp.frozen import FrozenTerms
 from pathwalker_cli.nlp.kernels import kernels
-from pathwalker_cli.nlp.mapped import mapped_functions
 from pathwalker_cli.nlp.tape import Tape, patterns_of
 from pathwalker_cli.nlp.taped import taped_functions
 
@@ -54,12 +53,7 @@ class Block:
     @property
     def matters(self) -> bool:
         """Whether the block has rows or adds to the objective."""
-        return bool(self.rows) or self.has_objective
-
-    @property
-    def has_objective(self) -> bool:
-        """Whether the block adds to the objective."""
-        return not self.objective.is_zero()
+        return bool(self.rows) or not self.objective.is_zero()
 
     @cached_property
     def values(self) -> ca.Function:
@@ -69,7 +63,10 @@ class Block:
     @cached_property
     def jacobian(self) -> ca.Function:
         """Function (unknowns, data, shared) -> Jacobian of constraints, gradient of objective."""
-        return self._function("jacobian", self._first_derivatives, [])
+        gradient = ca.sparsify(ca.gradient(self.objective, self.unknowns))
+        return self._function(
+            "jacobian", [ca.jacobian(self.constraints, self.unknowns), gradient], []
+        )
 
     @cached_property
     def hessian(self) -> ca.Function:
@@ -83,8 +80,8 @@ class Block:
     def tapes(self) -> dict[str, Tape] | None:
         """Tapes of `values`, `jacobian` and `hessian`; None where one cannot be made."""
         tapes = {}
-        for kind in KINDS:
-            tape = Tape.of(getattr(self, kind))
+        for kind, function in self.functions.items():
+            tape = Tape.of(function)
             if tape is None:
                 return None
             tapes[kind] = tape
@@ -101,11 +98,6 @@ class Block:
         if self.tapes is not None:
             return {kind: tape.patterns for kind, tape in self.tapes.items()}
         return {kind: patterns_of(function) for kind, function in self.functions.items()}
-
-    @cached_property
-    def _first_derivatives(self) -> list[ca.SX]:
-        gradient = ca.gradient(self.objective, self.unknowns)
-        return [ca.jacobian(self.constraints, self.unknowns), ca.sparsify(gradient)]
 
     def _function(self, kind: str, outputs: list[ca.SX], more: list[ca.SX]) -> ca.Function:
         """Return a function in which the frozen symbols are replaced by what they stand for."""
@@ -162,7 +154,7 @@ class Occurrences:
         upper: Upper bounds of the rows, shape (r, count).
         row_scale: Physical units per row unit, shape (r,).
         row_names: Names of the rows, r of them.
-        labels: Where each occurrence is, e.g. "left_flat at 40 %", count of them.
+        labels: Where each occurrence is, e.g. "ascent at 40 % of the phase", count of them.
         times: Instant of every row, shape (r, count); only differences within a series matter.
         weights: Quadrature weight of every row, shape (r, count).
         series: Rows of the same series sample one function of time; r names.
@@ -196,81 +188,72 @@ class Occurrences:
 
 
 class BlockProgram:
-    """A nonlinear program: minimise f(x; p) subject to bounds on x and g(x; p).
+    """The rows, objective and derivatives of a nonlinear program that is made of blocks.
 
     The parameters p are the shared numbers followed by the data of all occurrences.
 
     Args:
         size: Number of unknowns.
         occurrences: All blocks with their places; the rows of g follow their order.
-        shared_size: Number of shared numbers.
+        shared: The shared numbers.
     """
 
-    def __init__(self, size: int, occurrences: Sequence[Occurrences], shared_size: int) -> None:
+    def __init__(self, size: int, occurrences: Sequence[Occurrences], shared: np.ndarray) -> None:
         self.size = size
         self.occurrences = tuple(o for o in occurrences if o.count and o.block.matters)
-        self.shared_size = shared_size
-        self.lower = self._stack([o.lower for o in self.occurrences])
-        self.upper = self._stack([o.upper for o in self.occurrences])
+        self._shared = shared
         sizes = [o.block.rows * o.count for o in self.occurrences]
-        self._row_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
-        data_sizes = [o.data.size for o in self.occurrences]
-        self._data_offsets = shared_size + np.concatenate([[0], np.cumsum(data_sizes)]).astype(int)
-
-    @staticmethod
-    def _stack(arrays: Sequence[np.ndarray]) -> np.ndarray:
-        return np.concatenate([array.ravel(order="F") for array in arrays] or [np.zeros(0)])
+        self._row_offsets = np.cumsum([0, *sizes])
+        self._data_offsets = np.cumsum([len(shared), *(o.data.size for o in self.occurrences)])
 
     @property
     def rows(self) -> int:
         """Number of constraint rows."""
         return int(self._row_offsets[-1])
 
-    def parameters(self, shared: np.ndarray) -> np.ndarray:
-        """Return the parameter vector p for these shared numbers."""
-        return np.concatenate([shared, self._stack([o.data for o in self.occurrences])])
-
-    def row_name(self, row: int) -> str:
-        """Return what a row of g is and where, e.g. "toe_l height in right_toe at 40 %"."""
-        name, where = self.row_place(row)
-        return f"{name} in {where}"
-
-    def row_place(self, row: int) -> tuple[str, str]:
-        """Return the name of a row of g and where it stands."""
-        which = int(np.searchsorted(self._row_offsets, row, side="right")) - 1
-        occurrence = self.occurrences[which]
-        instance, local = divmod(row - self._row_offsets[which], occurrence.block.rows)
-        return occurrence.row_names[local], occurrence.labels[instance]
-
-    def rows_of(self, block: Block | KeptBlock) -> np.ndarray:
-        """Return the rows of g that a block stands for, shape (rows, occurrences)."""
-        i = next(i for i, o in enumerate(self.occurrences) if o.block is block)
-        shape = (block.rows, self.occurrences[i].count)
-        return self._row_offsets[i] + np.arange(np.prod(shape)).reshape(shape, order="F")
+    @cached_property
+    def row_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled lower and upper bounds of all rows."""
+        lower = _stacked([o.lower for o in self.occurrences])
+        return lower, _stacked([o.upper for o in self.occurrences])
 
     @property
     def row_scale(self) -> np.ndarray:
         """Physical units per unit of every row."""
         return np.concatenate([np.tile(o.row_scale, o.count) for o in self.occurrences])
 
+    @property
+    def parameters(self) -> np.ndarray:
+        """The parameter vector p."""
+        return np.concatenate([self._shared, _stacked([o.data for o in self.occurrences])])
+
+    def row_place(self, i: int) -> tuple[str, str]:
+        """Return the name of a row of g and where it stands."""
+        which = int(np.searchsorted(self._row_offsets, i, side="right")) - 1
+        occurrence = self.occurrences[which]
+        instance, local = divmod(i - self._row_offsets[which], occurrence.block.rows)
+        return occurrence.row_names[local], occurrence.labels[instance]
+
+    def rows_of(self, block: Block | KeptBlock) -> np.ndarray:
+        """Return the rows of g that a block stands for, shape (rows, occurrences)."""
+        i = next(i for i, o in enumerate(self.occurrences) if o.block is block)
+        return self._row_offsets[i] + _numbered((block.rows, self.occurrences[i].count))
+
+    @cached_property
     def functions(self) -> Mapping[str, ca.Function]:
-        """Return `nlp`, `grad_f`, `jac_g` and `hess_lag` in the form that `casadi.nlpsol` takes.
+        """`nlp`, `grad_f`, `jac_g` and `hess_lag` in the form that `casadi.nlpsol` takes.
 
         They live as long as this program or the mapping does; a solver alone does not keep them.
         """
-        return self._functions
-
-    def plain_functions(self) -> Mapping[str, ca.Function]:
-        """Return the same from expressions derived anew, for CasADi's virtual machine."""
-        return mapped_functions(self._assembly, [o.block.functions for o in self.occurrences])
-
-    @cached_property
-    def _functions(self) -> Mapping[str, ca.Function]:
         tapes = [o.block.tapes for o in self.occurrences] if kernels() is not None else [None]
         known = [of_block for of_block in tapes if of_block is not None]
         if len(known) < len(tapes):
             return self.plain_functions()
         return taped_functions(self._assembly, known)
+
+    def plain_functions(self) -> Mapping[str, ca.Function]:
+        """Return the same from expressions derived anew, for CasADi's virtual machine."""
+        return mapped_functions(self._assembly, [o.block.functions for o in self.occurrences])
 
     @cached_property
     def _assembly(self) -> Assembly:
@@ -282,12 +265,20 @@ class BlockProgram:
 
     def _sources(self, i: int, o: Occurrences) -> tuple[Source, ...]:
         """Return where the inputs of block i come from."""
-        data = np.arange(o.data.size).reshape(o.data.shape, order="F")
-        rows = np.arange(o.lower.size).reshape(o.lower.shape, order="F")
         return (
             Source("x", o.columns),
-            Source("p", self._data_offsets[i] + data),
-            Source("p", np.arange(self.shared_size)[:, None]),
+            Source("p", self._data_offsets[i] + _numbered(o.data.shape)),
+            Source("p", np.arange(len(self._shared))[:, None]),
             Source("lam_f", np.zeros((1, 1), int)),
-            Source("lam_g", self._row_offsets[i] + rows),
+            Source("lam_g", self._row_offsets[i] + _numbered(o.lower.shape)),
         )
+
+
+def _stacked(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    """Return arrays one after the other, each occurrence by occurrence."""
+    return np.concatenate([array.ravel(order="F") for array in arrays] or [np.zeros(0)])
+
+
+def _numbered(shape: tuple[int, ...]) -> np.ndarray:
+    """Return the places of an array in its stacked form, shape as given."""
+    return np.arange(np.prod(shape)).reshape(shape, order="F")

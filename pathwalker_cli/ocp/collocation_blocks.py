@@ -18,7 +18,7 @@ from pathwalker_cli.nlp.frozen import FrozenTerms
 from pathwalker_cli.nlp.tape import Tape
 from pathwalker_cli.ocp.phased import collocation_times, lagrange_weights, quadrature_weights
 from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase
-from pathwalker_cli.ocp.unknowns import Unknown, boundary_block
+from pathwalker_cli.ocp.transcription import Unknown, boundary_block
 
 __all__ = ["CollocationBlocks"]
 
@@ -93,7 +93,7 @@ class CollocationBlocks:
         y = y0.value + duration * fraction * at * (u0.value + at / 2 * rise)
         u = u0.value + at * rise
         values = [x.value, z.value, y, u, p.value, problem.shared, problem.point_data]
-        (result,), frozen = self._substituted(phase, [rows.value / rows.scale], values, "")
+        (result,), frozen = problem.substituted(phase, [rows.value / rows.scale], values)
         unknowns = [duration, *(k.scaled for k in (p, x, z, y0, u0, u1))]
         data = ca.vertcat(fraction, at, problem.point_data)
         name = f"{phase.name}_{kind}"
@@ -105,31 +105,6 @@ class CollocationBlocks:
             Unknown.of(self.problem.states, f"x{tag}"),
             Unknown.of(phase.algebraic, f"z{tag}"),
         )
-
-    def _substituted(
-        self, phase: Phase, expressions: list[ca.SX], values: list[ca.SX], tag: str
-    ) -> tuple[list[ca.SX], FrozenTerms]:
-        """Return a phase's expressions with its symbols replaced by values."""
-        problem = self.problem
-        symbols = [
-            problem.states.symbol,
-            phase.algebraic.symbol,
-            problem.smooth.symbol,
-            problem.controls.symbol,
-            problem.parameters.symbol,
-            problem.shared,
-            problem.point_data,
-        ]
-        frozen = phase.frozen
-        inputs = [*symbols, frozen.symbol_vector]
-        outer = ca.Function("expressions", inputs, expressions)
-        if not any(ca.depends_on(k, frozen.symbol_vector) for k in expressions if k.numel()):
-            unused = ca.SX.zeros(frozen.symbol_vector.numel())
-            return outer.call([*values, unused], True, False), FrozenTerms()
-        inner = ca.Function("meanings", symbols, [frozen.meaning_vector])
-        renewed = ca.SX.sym(f"frozen{tag}", frozen.symbol_vector.numel())
-        (meanings,) = inner.call(values, True, False)
-        return outer.call([*values, renewed], True, False), FrozenTerms([renewed], [meanings])
 
     def _interval_block(self, phase: Phase) -> Block:
         """Return collocation, smooth-state and integral rows of one interval.
@@ -153,7 +128,7 @@ class CollocationBlocks:
             values = [x.value, z.value, y, u0.value + times[k] * rise, p.value]
             values += [problem.shared, data[k]]
             expressions = [phase.derivative, phase.integrands]
-            (derivative, integrands), more = self._substituted(phase, expressions, values, str(k))
+            (derivative, integrands), more = problem.substituted(phase, expressions, values, str(k))
             slope = differentiation[k, 0] * x0.scaled
             for j, (other, _) in enumerate(points):
                 slope += differentiation[k, j + 1] * other.scaled

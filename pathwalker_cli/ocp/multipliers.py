@@ -33,7 +33,7 @@ def transferred(
 def _of_rows(old: CollocationProgram, values: np.ndarray, new: CollocationProgram) -> np.ndarray:
     """Return multipliers of the rows, block by block."""
     parts, offset = [], 0
-    for before, after in zip(old.program.occurrences, new.program.occurrences, strict=True):
+    for before, after in zip(old.occurrences, new.occurrences, strict=True):
         size = before.block.rows * before.count
         block = values[offset : offset + size].reshape(before.block.rows, before.count, order="F")
         offset += size

@@ -9,17 +9,9 @@ import numpy as np
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times
 from pathwalker_cli.ocp.problem import ProblemNumbers
 from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks, ShootingProblem
-from pathwalker_cli.ocp.shooting_steps import (
-    Slope,
-    Step,
-    adaptive_steps,
-    fixed_steps,
-)
+from pathwalker_cli.ocp.shooting_steps import Edges, Slope, Step, adaptive_steps, fixed_steps
 
-__all__ = ["Edges", "Shooter", "ShootingNodes"]
-
-Edges = tuple[tuple[np.ndarray, ...], ...]
-"""Ends of the steps of every interval, from 0 to 1, by phase and interval."""
+__all__ = ["Shooter", "ShootingNodes"]
 
 
 @dataclass(frozen=True)
