@@ -55,7 +55,7 @@ class Watcher(ca.Callback):
         sizes = {"f": 1, "x": program.size, "lam_x": program.size}
         sizes |= {"g": program.rows, "lam_g": program.rows}
         sizes |= dict.fromkeys(("p", "lam_p"), program.parameters.size)
-        self._sizes = [(name, sizes[name]) for name in ca.nlpsol_out()]
+        self._sizes = [sizes[name] for name in ca.nlpsol_out()]
         self._observer = observer
         self.begin(program)
         self.construct("watcher", {})
@@ -75,13 +75,9 @@ class Watcher(ca.Callback):
         """Return 1: whether to stop."""
         return 1
 
-    def get_name_in(self, i: int) -> str:
-        """Return the name of an output of `nlpsol`."""
-        return self._sizes[i][0]
-
     def get_sparsity_in(self, i: int) -> ca.Sparsity:
         """Return that it is dense, and its length."""
-        return ca.Sparsity.dense(self._sizes[i][1])
+        return ca.Sparsity.dense(self._sizes[i])
 
     def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
         """Report an iterate; return whether to stop."""

@@ -132,7 +132,7 @@ class Phase:
     end: Rows
     fixed_at_end: tuple[str, ...]
     integrands: ca.SX
-    frozen: FrozenTerms
+    frozen: FrozenTerms = field(default_factory=FrozenTerms)
 
 
 @dataclass(frozen=True)

@@ -153,15 +153,6 @@ class ShootingProgram(Transcription[ShootingPlaces]):
             labels,
         )
 
-    def from_motion(self, motion: PhasedMotion) -> np.ndarray:
-        """Return scaled unknowns whose nodes are those of a motion on any mesh.
-
-        In between they follow from integration, so only the ends of intervals miss their node.
-        """
-        degree = motion.phases[0].degree
-        resampled = motion.resampled(self.meshes, degree)
-        return self.from_nodes(ShootingNodes.of(self.blocks.shooting, resampled))
-
     def from_nodes(self, nodes: ShootingNodes) -> np.ndarray:
         """Return scaled unknowns for values at the nodes, integrated in between."""
         problem, layout = self.problem, self.layout
