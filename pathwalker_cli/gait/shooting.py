@@ -141,11 +141,6 @@ class ShootingSolution:
         return self.nodes.durations
 
     @property
-    def parameters(self) -> np.ndarray:
-        """Free parameters."""
-        return self.nodes.parameters
-
-    @property
     def distance(self) -> float:
         """Distance of the motion [m]."""
         return float(self.nodes.states[-1][-1, 0] - self.nodes.states[0][0, 0])
@@ -154,11 +149,6 @@ class ShootingSolution:
     def walking_speed(self) -> float:
         """Mean speed [m/s]."""
         return self.distance / float(self.durations.sum())
-
-    @property
-    def iterations(self) -> int:
-        """Iterations over all rounds."""
-        return sum(each.iterations for each in self.rounds)
 
     @property
     def seconds(self) -> float:

@@ -155,9 +155,11 @@ class Occurrences:
         row_scale: Physical units per row unit, shape (r,).
         row_names: Names of the rows, r of them.
         labels: Where each occurrence is, e.g. "ascent at 40 % of the phase", count of them.
-        times: Instant of every row, shape (r, count); only differences within a series matter.
-        weights: Quadrature weight of every row, shape (r, count).
-        series: Rows of the same series sample one function of time; r names.
+        times: Instants of the rows, shape (r, count) or broadcast to it; only differences within a
+            series matter.
+        weights: Quadrature weights of the rows, shape (r, count) or broadcast to it.
+        series: Rows of the same series sample one function of time; r names, or none where every
+            row is its own.
     """
 
     block: Block | KeptBlock
@@ -168,18 +170,9 @@ class Occurrences:
     row_scale: np.ndarray
     row_names: Sequence[str]
     labels: Sequence[str]
-    times: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    times: np.ndarray | float = 0.0
+    weights: np.ndarray | float = 1.0
     series: Sequence[str] = ()
-
-    def __post_init__(self) -> None:
-        """Let rows that stand at one instant only, or alone, be their own series."""
-        shape = (self.block.rows, self.count)
-        for name, default in (("times", 0.0), ("weights", 1.0)):
-            if not getattr(self, name).size:
-                object.__setattr__(self, name, np.full(shape, default))
-        if not self.series:
-            object.__setattr__(self, "series", tuple(map(str, range(self.block.rows))))
 
     @property
     def count(self) -> int:

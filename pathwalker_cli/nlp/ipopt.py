@@ -97,6 +97,11 @@ class Multipliers:
     unknowns: np.ndarray
     rows: np.ndarray
 
+    @property
+    def stacked(self) -> np.ndarray:
+        """Those of all unknowns and then of all rows, shape (n + m,)."""
+        return np.concatenate([self.unknowns, self.rows])
+
 
 @dataclass(frozen=True)
 class NlpResult:

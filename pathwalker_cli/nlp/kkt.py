@@ -26,7 +26,7 @@ import numpy as np
 from scipy import sparse
 
 from pathwalker_cli.nlp.ipopt import NlpResult
-from pathwalker_cli.nlp.program import Program
+from pathwalker_cli.nlp.program import Program, limits
 from pathwalker_cli.nlp.stage_ldl import SymmetricSystem, in_order_of
 
 __all__ = ["Answer", "KktSystem"]
@@ -96,19 +96,18 @@ class KktSystem:
         self.program = program
         self.result = result
         self._functions = program.functions
-        lower, upper = program.bounds
-        self._bound_ratio = _ratio(result.unknowns, lower, upper, result.multipliers.unknowns)
-        row_limits = program.row_bounds
-        row_ratio = _ratio(result.rows, *row_limits, result.multipliers.rows)
-        self._equality = row_limits[0] == row_limits[1]
-        self._rows = np.flatnonzero(self._equality | (row_ratio > _INACTIVE))
-        self._row_slack = np.where(self._equality, 0.0, 1.0 / np.maximum(row_ratio, _INACTIVE))
-        fixed = lower == upper
+        n = program.size
+        values = np.concatenate([result.unknowns, result.rows])
+        self._ratios = _ratio(values, *limits(program), result.multipliers.stacked)
+        self._bound_ratio, row_ratio = self._ratios[:n], self._ratios[n:]
+        equality = np.equal(*program.row_bounds)
+        self._rows = np.flatnonzero(equality | (row_ratio > _INACTIVE))
+        self._row_slack = np.where(equality, 0.0, 1.0 / np.maximum(row_ratio, _INACTIVE))
+        fixed = np.equal(*program.bounds)
         self.free = program.free_parameters[~fixed[program.free_parameters]]
         """Places of the free parameters."""
         fixed[program.free_parameters] = True
         self._fixed, self._moving = np.flatnonzero(fixed), np.flatnonzero(~fixed)
-        self._ratios = np.concatenate([self._bound_ratio, row_ratio])
         self.active = int((self._ratios > 1.0).sum())
         """Number of active inequalities."""
         doubtful = (self._ratios > 1.0 / _DOUBTFUL) & (self._ratios < _DOUBTFUL)
@@ -208,22 +207,12 @@ class KktSystem:
         low, high = self._first_order(below), self._first_order(above)
         objective = (high[0] - low[0]) / (2 * step)
         gradient, rows = ((b - a) / (2 * step) for a, b in zip(low[1:], high[1:], strict=True))
-        multipliers = self.result.multipliers
-        row_bounds, bounds = (
-            (b - a) / (2 * step)
-            for a, b in zip(self._pressed(below), self._pressed(above), strict=True)
-        )
-        rows = rows - row_bounds
+        multipliers, size = self.result.multipliers, self.program.size
+        pressed = (_pressed(multipliers.stacked, *limits(k)) for k in (below, above))
+        moved = np.subtract(*reversed(list(pressed))) / (2 * step)
+        bounds, rows = moved[:size], rows - moved[size:]
         weighted = objective + multipliers.rows @ rows - multipliers.unknowns @ bounds
         return _Change(float(weighted), gradient, rows, bounds)
-
-    def _pressed(self, program: Program) -> tuple[np.ndarray, np.ndarray]:
-        """Return the bounds that rows and unknowns press on; zero where there is none."""
-        multipliers = self.result.multipliers
-        return (
-            _pressed(multipliers.rows, *program.row_bounds),
-            _pressed(multipliers.unknowns, *program.bounds),
-        )
 
     def _answer(self, change: _Change) -> Answer:
         """Return the derivatives, free parameters moving as `change.bounds` says."""

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.nlp.ipopt import Multipliers
-from pathwalker_cli.nlp.program import Program
+from pathwalker_cli.nlp.program import Program, limits
 
 __all__ = ["Optimality", "optimality"]
 
@@ -54,11 +54,7 @@ def optimality(program: Program, unknowns: np.ndarray, multipliers: Multipliers)
     lagrangian = np.asarray(gradient).ravel() + jacobian.sparse().T @ multipliers.rows
     lagrangian = lagrangian + multipliers.unknowns
     values = np.concatenate([unknowns, rows])
-    lower, upper = (
-        np.concatenate([own, of_rows])
-        for own, of_rows in zip(program.bounds, program.row_bounds, strict=True)
-    )
-    both = np.concatenate([multipliers.unknowns, multipliers.rows])
+    (lower, upper), both = limits(program), multipliers.stacked
     scale = max(_MEAN_MULTIPLIER, float(np.abs(both).mean())) / _MEAN_MULTIPLIER
     gap = np.where(both > 0.0, upper - values, values - lower)
     bounded = (lower < upper) & np.isfinite(gap)

@@ -8,7 +8,7 @@ from typing import Protocol
 import casadi as ca
 import numpy as np
 
-__all__ = ["Program"]
+__all__ = ["Program", "limits"]
 
 
 class Program(Protocol):
@@ -69,3 +69,9 @@ class Program(Protocol):
 
     def row_place(self, i: int) -> tuple[str, str]:
         """Return the name of a row and where it stands."""
+
+
+def limits(program: Program) -> tuple[np.ndarray, np.ndarray]:
+    """Return lower and upper bounds of all unknowns and then all rows, shape (n + m,) each."""
+    lower, upper = map(np.concatenate, zip(program.bounds, program.row_bounds, strict=True))
+    return lower, upper

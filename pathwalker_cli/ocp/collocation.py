@@ -11,9 +11,8 @@ import numpy as np
 
 from pathwalker_cli.nlp.blocks import Occurrences
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
-from pathwalker_cli.ocp.collocation_layout import NODE, PhasePlaces, collocation_layout
 from pathwalker_cli.ocp.elimination import StageKeys
-from pathwalker_cli.ocp.layout import Bounded
+from pathwalker_cli.ocp.layout import NODE, Bounded, PhasePlaces, collocation_layout
 from pathwalker_cli.ocp.phased import (
     PhasedMotion,
     PhaseMotion,
@@ -21,7 +20,7 @@ from pathwalker_cli.ocp.phased import (
     lagrange_weights,
     quadrature_weights,
 )
-from pathwalker_cli.ocp.problem import ProblemNumbers, Rows
+from pathwalker_cli.ocp.problem import ProblemNumbers
 from pathwalker_cli.ocp.transcription import Transcription
 
 __all__ = ["CollocationProgram"]
@@ -107,35 +106,24 @@ class CollocationProgram(Transcription[PhasePlaces]):
 
     def _point_rows(self, i: int, kind: str) -> Occurrences:
         """Return the residual or path rows at all points of a phase."""
-        phase = self.problem.phases[i]
-        rows: Rows = getattr(phase, kind)
-        fractions, data = self._points[i]
+        phase, (fractions, data) = self.problem.phases[i], self._points[i]
         _, weights = quadrature_weights(self.blocks.degree)
-        weights = np.diff(self.meshes[i])[:, None] * weights
-        every = np.ones((len(rows.names), 1))
-        return Occurrences(
+        return self._rows_at(
             getattr(self.blocks.phases[i], kind),
+            getattr(phase, kind),
             self._point_columns(i),
-            data.reshape(len(data), -1),
-            *self._row_bounds(rows, fractions.size, phase.name, phase.fixed_at_end),
-            rows.scale,
-            rows.names,
             [self._label(i, f) for f in fractions.ravel()],
-            times=every * fractions.ravel(),
-            weights=every * weights.ravel(),
+            phase.name,
+            phase.fixed_at_end,
+            data.reshape(len(data), -1),
+            times=fractions.ravel(),
+            weights=(np.diff(self.meshes[i])[:, None] * weights).ravel(),
         )
 
     def _end_rows(self, i: int) -> Occurrences:
-        phase = self.problem.phases[i]
-        return Occurrences(
-            self.blocks.phases[i].end,
-            self._point_columns(i)[:, -1:],
-            self._points[i][1][:, -1, -1:],
-            *self._row_bounds(phase.end, 1, phase.name),
-            phase.end.scale,
-            phase.end.names,
-            [self._label(i, 1.0)],
-        )
+        phase, block, label = self.problem.phases[i], self.blocks.phases[i].end, self._label(i, 1.0)
+        columns, data = self._point_columns(i)[:, -1:], self._points[i][1][:, -1, -1:]
+        return self._rows_at(block, phase.end, columns, [label], phase.name, data=data)
 
     def _interval_rows(self, i: int) -> Occurrences:
         problem, d, mesh = self.problem, self.blocks.degree, self.meshes[i]
@@ -161,7 +149,7 @@ class CollocationProgram(Transcription[PhasePlaces]):
             names,
             [self._label(i, f) for f in mesh[:-1]],
             times=np.concatenate([np.repeat(fractions.T, nx, axis=0), ends]),
-            weights=weights[:, None] * np.ones(count),
+            weights=weights[:, None],
             series=tuple(name.split(" at point ")[0] for name in names),
         )
 
@@ -177,28 +165,18 @@ class CollocationProgram(Transcription[PhasePlaces]):
         return np.concatenate(parts, axis=1).T
 
     def _node_rows(self) -> Occurrences:
-        rows, layout = self.problem.node_rows, self.layout
+        layout = self.layout
         count = len(layout.smooth)
         labels, times, weights = [""] * count, np.zeros(count), np.zeros(count)
-        for i, places in enumerate(layout.phases):
-            steps = np.diff(self.meshes[i])
-            weights[places.nodes[:-1]] += steps / 2
-            weights[places.nodes[1:]] += steps / 2
-            times[places.nodes] = i + self.meshes[i]
-            for node, fraction in zip(places.nodes, self.meshes[i], strict=True):
+        for i, (mesh, places) in enumerate(zip(self.meshes, layout.phases, strict=True)):
+            for nodes in _ends(places):
+                weights[nodes] += np.diff(mesh) / 2
+            times[places.nodes] = i + mesh
+            for node, fraction in zip(places.nodes, mesh, strict=True):
                 labels[node] = self._label(i, fraction)
-        every = np.ones((len(rows.names), 1))
-        return Occurrences(
-            self.blocks.node,
-            np.concatenate([layout.smooth, layout.controls], axis=1).T,
-            np.zeros((0, count)),
-            *self._row_bounds(rows, count),
-            rows.scale,
-            rows.names,
-            labels,
-            times=every * times,
-            weights=every * weights,
-        )
+        columns = np.concatenate([layout.smooth, layout.controls], axis=1).T
+        block, rows = self.blocks.node, self.problem.node_rows
+        return self._rows_at(block, rows, columns, labels, times=times, weights=weights)
 
     def _samples(self) -> Occurrences:
         """Return the instants at which the motion is compared with something."""

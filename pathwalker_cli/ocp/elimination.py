@@ -13,8 +13,7 @@ import numpy as np
 
 from pathwalker_cli.nlp.blocks import Block, KeptBlock
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
-from pathwalker_cli.ocp.collocation_layout import PhasePlaces
-from pathwalker_cli.ocp.layout import Layout
+from pathwalker_cli.ocp.layout import Layout, PhasePlaces
 
 __all__ = ["StageKeys"]
 

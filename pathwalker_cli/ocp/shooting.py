@@ -119,17 +119,9 @@ class ShootingProgram(Transcription[ShootingPlaces]):
 
     def _step_rows(self, i: int) -> Occurrences:
         """Return the formulae of all steps of a phase."""
-        problem, layout, at = self.problem, self.layout, self.layout.phases[i]
-        mesh, stages = self.meshes[i], CASH_KARP.stages
-        columns, data, labels = [], [], []
+        problem, mesh, at = self.problem, self.meshes[i], self.layout.phases[i]
+        data, labels = [], []
         for m, n in enumerate(at.interval):
-            left, right = at.steps[m : m + 2]
-            parts = [[layout.durations[i]], layout.parameters]
-            for k in range(stages):
-                parts += [at.states[m, k], at.smooth[m, k], at.algebraic[m, k]]
-            parts += [layout.controls[at.nodes[n]], layout.controls[at.nodes[n + 1]]]
-            parts += [layout.integrals[left], layout.states[right], layout.smooth[right]]
-            columns.append(np.concatenate([*parts, layout.integrals[right]]))
             begin, end = self.edges[i][n][m - at.starts[n] :][:2]
             length = mesh[n + 1] - mesh[n]
             points = mesh[n] + length * (begin + (end - begin) * CASH_KARP.times)
@@ -137,14 +129,14 @@ class ShootingProgram(Transcription[ShootingPlaces]):
             step = [length * (end - begin), begin, end - begin, self.rounding]
             data.append(np.concatenate([step, *given]))
             labels.append(f"{problem.phases[i].name} interval {n + 1} step {m - at.starts[n] + 1}")
-        where = [f"stage {k + 2}" for k in range(stages - 1)] + ["end"]
+        where = [f"stage {k + 2}" for k in range(CASH_KARP.stages - 1)] + ["end"]
         groups = (problem.states, problem.smooth)
         names = [f"{s} at {k}" for k in where for group in groups for s in group.names]
-        scale = np.tile(np.concatenate([group.scale for group in groups]), stages)
-        zeros = np.zeros((len(names) + len(problem.integrals), len(columns)))
+        scale = np.tile(np.concatenate([group.scale for group in groups]), CASH_KARP.stages)
+        zeros = np.zeros((len(names) + len(problem.integrals), len(data)))
         return Occurrences(
             self.blocks.phases[i].step,
-            np.array(columns).T,
+            self._step_columns(i),
             np.array(data).T,
             zeros,
             zeros,
@@ -152,6 +144,18 @@ class ShootingProgram(Transcription[ShootingPlaces]):
             [*names, *(f"integral {s}" for s in problem.integrals)],
             labels,
         )
+
+    def _step_columns(self, i: int) -> np.ndarray:
+        """Return the unknowns of every step of a phase, shape (n, M)."""
+        layout, at = self.layout, self.layout.phases[i]
+        once = np.append(layout.durations[i], layout.parameters)
+        parts = [np.tile(once, (len(at.interval), 1))]
+        for k in range(CASH_KARP.stages):
+            parts += [at.states[:, k], at.smooth[:, k], at.algebraic[:, k]]
+        parts += [layout.controls[at.nodes[at.interval + k]] for k in range(2)]
+        left, right = at.steps[:-1], at.steps[1:]
+        parts += [layout.integrals[left], layout.states[right], layout.smooth[right]]
+        return np.concatenate([*parts, layout.integrals[right]], axis=1).T
 
     def from_nodes(self, nodes: ShootingNodes) -> np.ndarray:
         """Return scaled unknowns for values at the nodes, integrated in between."""

@@ -120,16 +120,6 @@ class Transcription(BlockProgram, Generic[P]):
     def _label(self, i: int, fraction: float) -> str:
         return f"{self.problem.phases[i].name} at {100 * fraction:.0f} % of the phase"
 
-    def _row_bounds(
-        self, rows: Rows, count: int, phase: str = "", free_at_end: tuple[str, ...] = ()
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return scaled bounds of rows that hold at several instants, shape (r, count) each."""
-        limits = self.numbers.bounds.of_rows(rows, phase)
-        lower, upper = (np.tile(k[:, None], count) for k in limits)
-        free = [k for k, name in enumerate(rows.names) if name in free_at_end]
-        lower[free, -1], upper[free, -1] = -INFINITY, INFINITY
-        return lower, upper
-
     def _boundary_rows(self, block: Block | KeptBlock) -> Occurrences:
         """Return the occurrence of a boundary block, see `boundary_block`."""
         rows, layout = self.problem.boundary.rows, self.layout
@@ -146,8 +136,28 @@ class Transcription(BlockProgram, Generic[P]):
         labels: list[str],
         phase: str = "",
         free_at_end: tuple[str, ...] = (),
+        data: np.ndarray | None = None,
+        times: np.ndarray | float = 0.0,
+        weights: np.ndarray | float = 1.0,
     ) -> Occurrences:
-        """Return rows without data at these columns, see `Occurrences` and `_row_bounds`."""
-        bounds = self._row_bounds(rows, len(labels), phase, free_at_end)
-        data = np.zeros((0, len(labels)))
-        return Occurrences(block, columns, data, *bounds, rows.scale, rows.names, labels)
+        """Return rows of the problem at these columns.
+
+        Args:
+            block: Their block.
+            rows: The rows.
+            columns: Unknowns of every occurrence, shape (n, count).
+            labels: Where each occurrence is, count of them.
+            phase: Phase under which their bounds are looked up.
+            free_at_end: Rows that are not bounded at the last occurrence.
+            data: Numbers of each occurrence, shape (m, count); none if left out.
+            times: See `Occurrences`.
+            weights: See `Occurrences`.
+        """
+        count = len(labels)
+        limits = self.numbers.bounds.of_rows(rows, phase)
+        lower, upper = (np.tile(k[:, None], count) for k in limits)
+        free = [k for k, name in enumerate(rows.names) if name in free_at_end]
+        lower[free, -1], upper[free, -1] = -INFINITY, INFINITY
+        data = np.zeros((0, count)) if data is None else data
+        about = (rows.scale, rows.names, labels, times, weights)
+        return Occurrences(block, columns, data, lower, upper, *about)

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from pathwalker_cli.nlp.ipopt import NlpResult
-from pathwalker_cli.nlp.program import Program
+from pathwalker_cli.nlp.program import Program, limits
 from pathwalker_cli.ocp.transcription import Transcription
 
 __all__ = ["ActiveBound", "Violation", "active_bounds", "largest_violations"]
@@ -74,42 +74,19 @@ class ActiveBound:
                    tuple(places.split(", ")) if places else ())  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Limited:
-    """All rows and then all unknowns of a solution, in solver units."""
-
-    values: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    multipliers: np.ndarray
-    scale: np.ndarray
-
-    @classmethod
-    def of(cls, program: Program, result: NlpResult) -> _Limited:
-        """Return what a solution of a program reaches, and its limits."""
-        multipliers = result.multipliers
-        pairs = (
-            (result.rows, result.unknowns),
-            *zip(program.row_bounds, program.bounds, strict=True),
-            (multipliers.rows, multipliers.unknowns),
-            (program.row_scale, program.scale),
-        )
-        return cls(*map(np.concatenate, pairs))
-
-
 def largest_violations(
     program: Program, result: NlpResult, count: int = 5
 ) -> tuple[Violation, ...]:
     """Return the largest violations in physical units, largest first; zero ones count too."""
-    limited = _Limited.of(program, result)
-    missed = (
-        np.maximum(limited.lower - limited.values, limited.values - limited.upper) * limited.scale
-    )
-    missed = np.nan_to_num(missed, nan=np.inf, neginf=0.0).clip(0.0)
+    values, lower, upper, scale = _all(program, result)
+    missed = np.maximum(lower - values, values - upper) * scale
+    # rows before unknowns where they are missed by as much
+    missed = np.roll(np.nan_to_num(missed, nan=np.inf, neginf=0.0).clip(0.0), -program.size)
     found = []
     for i in np.argsort(-missed, kind="stable")[:count].tolist():
         kind = "" if i < program.rows else "bound of "
-        found.append(Violation(kind + " in ".join(_place(program, i)), float(missed[i])))
+        name = " in ".join(_place(program, (i + program.size) % len(missed)))
+        found.append(Violation(kind + name, float(missed[i])))
     return tuple(found)
 
 
@@ -119,25 +96,31 @@ def active_bounds(program: Transcription[Any], result: NlpResult) -> tuple[Activ
     Running costs that stay zero are left out: they hold nothing back.
     """
     groups: dict[tuple[str, str, float], list[str]] = {}
-    limited = _Limited.of(program, result)
-    for side, limit, gap, pull in (
-        ("lower", limited.lower, limited.values - limited.lower, -limited.multipliers),
-        ("upper", limited.upper, limited.upper - limited.values, limited.multipliers),
+    values, lower, upper, scale = _all(program, result)
+    for side, limit, gap, sign in (
+        ("lower", lower, values - lower, -1.0),
+        ("upper", upper, upper - values, 1.0),
     ):
+        pull = sign * result.multipliers.stacked
         # along the barrier gap times multiplier is constant: active is where the multiplier wins
-        hit = (gap < np.minimum(_NEAR, pull)) & (pull > _PULL) & (limited.upper > limited.lower)
+        hit = (gap < np.minimum(_NEAR, pull)) & (pull > _PULL) & (upper > lower)
         for i in np.flatnonzero(hit).tolist():
             name, where = _place(program, i)
             if name in program.problem.integrals:
                 continue
-            value = round(float(limit[i] * limited.scale[i]), 9)
-            phases = groups.setdefault((name, side, value), [])
+            phases = groups.setdefault((name, side, round(float(limit[i] * scale[i]), 9)), [])
             phase = "" if where in ("all phases", "the whole motion") else where.split(" ")[0]
             if phase and phase not in phases:
                 phases.append(phase)
     return tuple(ActiveBound(*key, tuple(places)) for key, places in sorted(groups.items()))
 
 
+def _all(program: Program, result: NlpResult) -> tuple[np.ndarray, ...]:
+    """Return values, lower and upper bounds and scale of all unknowns and then all rows."""
+    scale = np.concatenate([program.scale, program.row_scale])
+    return np.concatenate([result.unknowns, result.rows]), *limits(program), scale
+
+
 def _place(program: Program, i: int) -> tuple[str, str]:
-    """Return name and place of one of all rows and then all unknowns."""
-    return program.row_place(i) if i < program.rows else program.unknown_place(i - program.rows)
+    """Return name and place of one of all unknowns and then all rows."""
+    return program.unknown_place(i) if i < program.size else program.row_place(i - program.size)
