@@ -187,7 +187,7 @@ def _instructions(program: CollocationProgram, name: str) -> int:
     """Return the instructions that a function of the program runs at all occurrences."""
     kinds = {kind for kind, _ in FUNCTIONS[name][1].values()}
     return sum(
-        o.count * int(getattr(o.block, kind).n_instructions())
+        o.count * int(o.block.functions[kind].n_instructions())
         for o in program.occurrences
         for kind in kinds
     )

@@ -14,21 +14,20 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.nlp.assembly import KINDS, Assembly, Part, Source, mapped_functions
+from pathwalker_cli.nlp.assembly import Assembly, Part, Source, mapped_functions
 from pathwalker_cli.nlp.frozen import FrozenTerms
 from pathwalker_cli.nlp.kernels import kernels
 from pathwalker_cli.nlp.tape import Tape, patterns_of
 from pathwalker_cli.nlp.taped import taped_functions
 
-__all__ = ["Block", "BlockProgram", "KeptBlock", "Occurrences"]
+__all__ = ["Block", "BlockProgram", "Expressions", "Occurrences"]
 
 
 @dataclass(frozen=True)
-class Block:
-    """A small function that occurs many times in a nonlinear program.
+class Expressions:
+    """What a block computes.
 
     Args:
-        name: Name for reports.
         unknowns: Its unknowns, SX of shape (n,).
         data: Numbers that differ from occurrence to occurrence, SX of shape (m,).
         shared: Numbers that all occurrences have in common, SX of shape (s,).
@@ -37,7 +36,6 @@ class Block:
         frozen: Stand-ins used in the expressions, see `FrozenTerms`.
     """
 
-    name: str
     unknowns: ca.SX
     data: ca.SX
     shared: ca.SX
@@ -45,40 +43,76 @@ class Block:
     objective: ca.SX = field(default_factory=lambda: ca.SX(0))
     frozen: FrozenTerms = field(default_factory=FrozenTerms)
 
-    @property
+    def functions(self, name: str) -> dict[str, ca.Function]:
+        """Return the functions by kind.
+
+        `values`: (unknowns, data, shared) -> constraints, objective; `jacobian`: the same ->
+        Jacobian of constraints, gradient of objective; `hessian`: (..., lam_f, lam_g) -> upper
+        Hessian of the Lagrangian.
+        """
+        x, objective, rows = self.unknowns, self.objective, self.constraints
+        gradient = ca.sparsify(ca.gradient(objective, x))
+        lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", rows.numel())
+        lagrangian = lam_f * objective + ca.dot(lam_g, rows)
+        hessian = ca.triu(ca.hessian(lagrangian, x)[0])
+        return {
+            "values": self._function(f"{name}_values", [rows, ca.sparsify(objective)]),
+            "jacobian": self._function(f"{name}_jacobian", [ca.jacobian(rows, x), gradient]),
+            "hessian": self._function(f"{name}_hessian", [hessian], lam_f, lam_g),
+        }
+
+    def _function(self, name: str, outputs: list[ca.SX], *more: ca.SX) -> ca.Function:
+        """Return a function in which the frozen symbols are replaced by what they stand for."""
+        inputs = [self.unknowns, self.data, self.shared, *more]
+        if not self.frozen.symbols:
+            return ca.Function(name, inputs, outputs)
+        outer = ca.Function("frozen", [*inputs, self.frozen.symbol_vector], outputs)
+        results = outer.call([*inputs, self.frozen.meaning_vector], True, False)
+        return ca.Function(name, inputs, results)
+
+
+class Block:
+    """A small function that occurs many times in a nonlinear program.
+
+    Args:
+        name: Name for reports.
+        build: Returns its expressions; called when somebody asks for what is not kept.
+        kept: Number of rows and tapes by kind, where they are known; a block that does not matter
+            has none.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        build: Callable[[], Expressions],
+        kept: tuple[int, dict[str, Tape]] | None = None,
+    ) -> None:
+        self.name = name
+        self.kept = kept
+        self._build = build
+
+    @cached_property
+    def expressions(self) -> Expressions:
+        """What it computes."""
+        return self._build()
+
+    @cached_property
     def rows(self) -> int:
         """Number of constraint rows."""
-        return int(self.constraints.numel())
+        return self.kept[0] if self.kept else int(self.expressions.constraints.numel())
 
-    @property
+    @cached_property
     def matters(self) -> bool:
         """Whether the block has rows or adds to the objective."""
-        return bool(self.rows) or not self.objective.is_zero()
-
-    @cached_property
-    def values(self) -> ca.Function:
-        """Function (unknowns, data, shared) -> constraints, objective."""
-        return self._function("values", [self.constraints, ca.sparsify(self.objective)], [])
-
-    @cached_property
-    def jacobian(self) -> ca.Function:
-        """Function (unknowns, data, shared) -> Jacobian of constraints, gradient of objective."""
-        gradient = ca.sparsify(ca.gradient(self.objective, self.unknowns))
-        return self._function(
-            "jacobian", [ca.jacobian(self.constraints, self.unknowns), gradient], []
-        )
-
-    @cached_property
-    def hessian(self) -> ca.Function:
-        """Function (unknowns, data, shared, lam_f, lam_g) -> upper Hessian of the Lagrangian."""
-        lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", self.rows)
-        lagrangian = lam_f * self.objective + ca.dot(lam_g, self.constraints)
-        hessian = ca.triu(ca.hessian(lagrangian, self.unknowns)[0])
-        return self._function("hessian", [hessian], [lam_f, lam_g])
+        if self.kept:
+            return bool(self.kept[1])
+        return bool(self.rows) or not self.expressions.objective.is_zero()
 
     @cached_property
     def tapes(self) -> dict[str, Tape] | None:
-        """Tapes of `values`, `jacobian` and `hessian`; None where one cannot be made."""
+        """Tapes of the functions by kind; None where one cannot be made."""
+        if self.kept:
+            return self.kept[1]
         tapes = {}
         for kind, function in self.functions.items():
             tape = Tape.of(function)
@@ -89,8 +123,8 @@ class Block:
 
     @cached_property
     def functions(self) -> dict[str, ca.Function]:
-        """The functions by kind."""
-        return {kind: getattr(self, kind) for kind in KINDS}
+        """The functions by kind, see `Expressions.functions`."""
+        return self.expressions.functions(self.name)
 
     @property
     def patterns(self) -> dict[str, tuple[np.ndarray, ...]]:
@@ -98,48 +132,6 @@ class Block:
         if self.tapes is not None:
             return {kind: tape.patterns for kind, tape in self.tapes.items()}
         return {kind: patterns_of(function) for kind, function in self.functions.items()}
-
-    def _function(self, kind: str, outputs: list[ca.SX], more: list[ca.SX]) -> ca.Function:
-        """Return a function in which the frozen symbols are replaced by what they stand for."""
-        inputs = [self.unknowns, self.data, self.shared, *more]
-        name = f"{self.name}_{kind}"
-        if not self.frozen.symbols:
-            return ca.Function(name, inputs, outputs)
-        outer = ca.Function("frozen", [*inputs, self.frozen.symbol_vector], outputs)
-        results = outer.call([*inputs, self.frozen.meaning_vector], True, False)
-        return ca.Function(name, inputs, results)
-
-
-@dataclass(frozen=True)
-class KeptBlock:
-    """A block whose tapes are known; its expressions are built only if somebody asks for functions.
-
-    Args:
-        name: Name for reports.
-        rows: Number of constraint rows.
-        tapes: Tapes of `values`, `jacobian` and `hessian`; none of a block that does not matter.
-        build: Returns the block itself.
-    """
-
-    name: str
-    rows: int
-    tapes: dict[str, Tape]
-    build: Callable[[], Block]
-
-    @property
-    def matters(self) -> bool:
-        """Whether the block has rows or adds to the objective."""
-        return bool(self.tapes)
-
-    @property
-    def patterns(self) -> dict[str, tuple[np.ndarray, ...]]:
-        """Row and column of the nonzeros of every output, shape (nnz, 2) each, by kind."""
-        return {kind: tape.patterns for kind, tape in self.tapes.items()}
-
-    @cached_property
-    def functions(self) -> dict[str, ca.Function]:
-        """The functions by kind."""
-        return self.build().functions
 
 
 @dataclass(frozen=True)
@@ -162,7 +154,7 @@ class Occurrences:
             row is its own.
     """
 
-    block: Block | KeptBlock
+    block: Block
     columns: np.ndarray
     data: np.ndarray
     lower: np.ndarray
@@ -227,7 +219,7 @@ class BlockProgram:
         instance, local = divmod(i - self._row_offsets[which], occurrence.block.rows)
         return occurrence.row_names[local], occurrence.labels[instance]
 
-    def rows_of(self, block: Block | KeptBlock) -> np.ndarray:
+    def rows_of(self, block: Block) -> np.ndarray:
         """Return the rows of g that a block stands for, shape (rows, occurrences)."""
         i = next(i for i, o in enumerate(self.occurrences) if o.block is block)
         return self._row_offsets[i] + _numbered((block.rows, self.occurrences[i].count))

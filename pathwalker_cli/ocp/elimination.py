@@ -11,13 +11,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pathwalker_cli.nlp.blocks import Block, KeptBlock
+from pathwalker_cli.nlp.blocks import Block
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.layout import Layout, PhasePlaces
 
 __all__ = ["StageKeys"]
 
-RowsOf = Callable[[Block | KeptBlock], np.ndarray]
+RowsOf = Callable[[Block], np.ndarray]
 
 
 class StageKeys:

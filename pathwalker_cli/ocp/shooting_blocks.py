@@ -19,16 +19,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.nlp.blocks import Block
-from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Rows, Variables
+from pathwalker_cli.nlp.blocks import Block, Expressions
+from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Variables
 from pathwalker_cli.ocp.shooting_steps import CASH_KARP
-from pathwalker_cli.ocp.transcription import Unknown, boundary_block
+from pathwalker_cli.ocp.transcription import Unknown, boundary_expressions
 
 __all__ = ["PhaseBlocks", "ShootingBlocks", "ShootingProblem"]
 
@@ -93,24 +93,25 @@ class ShootingBlocks:
     def __init__(self, shooting: ShootingProblem) -> None:
         self.shooting = shooting
         self.problem = shooting.problem
-        self.phases = tuple(
-            PhaseBlocks(
-                residual=self._point_block(phase, phase.residual, "residual"),
-                path=self._point_block(phase, phase.path, "path"),
-                end=self._point_block(phase, phase.end, "end"),
-                step=self._step_block(phase),
-                dynamics=self._dynamics(phase),
-            )
-            for phase in self.problem.phases
-        )
+        ends = partial(boundary_expressions, self.problem, shooting.controls)
+        self.boundary = Block("boundary", ends)
+        self.phases = tuple(map(self._phase_blocks, self.problem.phases))
+
+    def _phase_blocks(self, phase: Phase) -> PhaseBlocks:
+        points = {
+            kind: Block(f"{phase.name}_{kind}", partial(self._point, phase, kind))
+            for kind in ("residual", "path", "end")
+        }
+        step = Block(f"{phase.name}_step", partial(self._step, phase))
+        return PhaseBlocks(**points, step=step, dynamics=self._dynamics(phase))
 
     def _padded(self, phase: Phase, z: Any) -> Any:
         """Return all algebraic variables: zeros behind those that are solved for."""
         return ca.vertcat(z, type(z).zeros(phase.algebraic.size - z.numel()))
 
-    def _point_block(self, phase: Phase, rows: Rows, label: str) -> Block:
+    def _point(self, phase: Phase, kind: str) -> Expressions:
         """Return rows at one instant."""
-        problem = self.problem
+        problem, rows = self.problem, getattr(phase, kind)
         p = Unknown.of(problem.parameters, "p")
         x, y = Unknown.of(problem.states, "x"), Unknown.of(problem.smooth, "y")
         z = Unknown.of(self.shooting.algebraic(phase), "z")
@@ -119,10 +120,9 @@ class ShootingBlocks:
         values = [x.value, self._padded(phase, z.value), y.value, *nothing]
         (result,), frozen = problem.substituted(phase, [rows.value / rows.scale], values)
         unknowns = ca.vertcat(p.scaled, x.scaled, y.scaled, z.scaled)
-        name = f"{phase.name}_{label}"
-        return Block(name, unknowns, ca.SX(0, 1), problem.shared, result, frozen=frozen)
+        return Expressions(unknowns, ca.SX(0, 1), problem.shared, result, frozen=frozen)
 
-    def _step_block(self, phase: Phase) -> Block:
+    def _step(self, phase: Phase) -> Expressions:
         """Return the formulae of stages 2 to s and of the end of one step.
 
         Data: share of the phase that the step takes, where it begins and how long it is as shares
@@ -166,8 +166,7 @@ class ShootingBlocks:
         rows.append(after - before - step * cost / problem.integral_scale)
         stages = [k.scaled for stage in zip(x, y, z, strict=True) for k in stage]
         ends = [left.scaled, right.scaled, before, x_end.scaled, y_end.scaled, after]
-        return Block(
-            f"{phase.name}_step",
+        return Expressions(
             ca.vertcat(duration, p.scaled, *stages, *ends),
             ca.vertcat(share, begin, width, rounding, *data),
             problem.shared,
@@ -203,8 +202,3 @@ class ShootingBlocks:
         x_rate, cost = slope(x, self._padded(phase, z), y, y_rate, p, shared, data)
         outputs = [z, ca.vertcat(x_rate, y_rate, cost)]
         return ca.Function(f"{phase.name}_dynamics", inputs, outputs)
-
-    @cached_property
-    def boundary(self) -> Block:
-        """Boundary rows and objective with e in the place of the controls, see `boundary_block`."""
-        return boundary_block(self.problem, self.shooting.controls)

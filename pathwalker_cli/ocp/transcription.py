@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.nlp.blocks import Block, BlockProgram, KeptBlock, Occurrences
+from pathwalker_cli.nlp.blocks import Block, BlockProgram, Expressions, Occurrences
 from pathwalker_cli.ocp.layout import Bounded, Layout
 from pathwalker_cli.ocp.problem import (
     INFINITY,
@@ -19,7 +19,7 @@ from pathwalker_cli.ocp.problem import (
     Variables,
 )
 
-__all__ = ["Transcription", "Unknown", "boundary_block"]
+__all__ = ["Transcription", "Unknown", "boundary_expressions"]
 
 P = TypeVar("P")
 
@@ -38,7 +38,7 @@ class Unknown:
         return cls(scaled, scaled * variables.scale)
 
 
-def boundary_block(problem: MultiPhaseProblem, controls: Variables) -> Block:
+def boundary_expressions(problem: MultiPhaseProblem, controls: Variables) -> Expressions:
     """Return boundary rows and objective.
 
     Unknowns T of all phases, p, first x, y, controls, last x, y, controls, running costs.
@@ -59,7 +59,7 @@ def boundary_block(problem: MultiPhaseProblem, controls: Variables) -> Block:
     values = [b.durations, *(k.value for k in unknowns), problem.shared]
     rows, objective = outer.call(values, True, False)
     scaled = ca.vertcat(b.durations, *(k.scaled for k in unknowns))
-    return Block("boundary", scaled, ca.SX(0, 1), problem.shared, rows, objective)
+    return Expressions(scaled, ca.SX(0, 1), problem.shared, rows, objective)
 
 
 class Transcription(BlockProgram, Generic[P]):
@@ -120,8 +120,8 @@ class Transcription(BlockProgram, Generic[P]):
     def _label(self, i: int, fraction: float) -> str:
         return f"{self.problem.phases[i].name} at {100 * fraction:.0f} % of the phase"
 
-    def _boundary_rows(self, block: Block | KeptBlock) -> Occurrences:
-        """Return the occurrence of a boundary block, see `boundary_block`."""
+    def _boundary_rows(self, block: Block) -> Occurrences:
+        """Return the occurrence of a boundary block, see `boundary_expressions`."""
         rows, layout = self.problem.boundary.rows, self.layout
         arrays = (layout.states, layout.smooth, layout.controls)
         ends = [array[k] for k in (0, -1) for array in arrays]
@@ -130,7 +130,7 @@ class Transcription(BlockProgram, Generic[P]):
 
     def _rows_at(
         self,
-        block: Block | KeptBlock,
+        block: Block,
         rows: Rows,
         columns: np.ndarray,
         labels: list[str],
