@@ -70,8 +70,7 @@ def study_of(patient: Patient, folder: Path) -> StudyConfig:
 def cost_of(solver: GaitSolver, motion: PhasedMotion) -> float:
     """Return the cost of a motion."""
     program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)
-    parameters = program.program.parameters(solver.prediction.shared)
-    return float(program.program.functions()["nlp"](program.to_unknowns(motion), parameters)[0])
+    return float(program.functions["nlp"](program.to_unknowns(motion), program.parameters)[0])
 
 
 def test_the_solution_of_the_mirror_image_is_mirrored(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.gait.goal_costs import goal_values
+from pathwalker_cli.gait.cost_terms import goal_values
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.json_file import json_text
 from pathwalker_cli.io.yaml_file import yaml_text

@@ -13,8 +13,7 @@ import numpy as np
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.goal_costs import goal_values
+from pathwalker_cli.gait.cost_terms import cost_terms, goal_values
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.walker import build_walker
@@ -195,7 +194,7 @@ def _numbers(run: Run, solver: GaitSolver, numbers: GaitMetrics) -> Iterator[Che
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
     made: dict[str, Any] = numbers.as_dict()
     if run.config.transcription == "collocation":
-        terms = cost_terms(run.motion, solver.gait, solver.weights, solver.samples)
+        terms = cost_terms(run.motion, solver.gait.costs, solver.weights, solver.samples)
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
         made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)
@@ -284,8 +283,9 @@ def _solution(run: Run, solver: GaitSolver) -> Iterator[Check]:
     motion = replace(run.motion, phases=phases)
     program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)
     unknowns = program.to_unknowns(motion)
-    if unknowns.size != run.multipliers.unknowns.size or (
-        program.program.rows != run.multipliers.rows.size
+    if (program.size, program.rows) != (
+        run.multipliers.unknowns.size,
+        run.multipliers.rows.size,
     ):
         yield Check("optimality", math.inf, 0.0, "", "multipliers of another program")
         return
