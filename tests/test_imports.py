@@ -24,6 +24,7 @@ LAYERS = (
     {"model"},
     {"problems", "patient.variation", "gait.goals"},
     {"config"},
+    {"case"},
     {"nlp.frozen"},
     {"ocp.problem", "ocp.phased"},
     {"ocp", "nlp"},

@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.case import Case
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
@@ -79,11 +80,11 @@ class GaitSolver:
     """One problem structure, built once; solves it on any mesh with any numbers.
 
     Args:
-        config: The study.
+        case: What is solved, and for whom.
         observer: Called after every iteration with the stage's name.
     """
 
-    config: StudyConfig
+    case: Case
     observer: StageObserver | None = None
     stages: list[StageRecord] = field(default_factory=list)
     seconds: dict[str, float] = field(
@@ -94,8 +95,7 @@ class GaitSolver:
     def __post_init__(self) -> None:
         """Build walker, bounds and the blocks of the problem."""
         began = time.perf_counter()
-        patient = study_patient(self.config)
-        model = self.config.model
+        model, patient = self.config.model, self.case.patient
         self.walker = build_walker(patient, self.config.condition, model.published, model.backend)
         self.bounds = gait_bounds(self.walker, self.config.bounds)
         self.gait = GaitProblem(self.walker, self._form(), self.config.cost.wanted)
@@ -105,6 +105,11 @@ class GaitSolver:
             self.bounds = recorded_durations(self.bounds, self.stride.durations)
         self.blocks = gait_blocks(self.gait, self.config.mesh.degree)
         self.seconds["build"] += time.perf_counter() - began
+
+    @property
+    def config(self) -> StudyConfig:
+        """What is solved."""
+        return self.case.config
 
     def _form(self) -> Form:
         """Return what the phases are.
@@ -376,7 +381,7 @@ class GaitSolver:
         motion = program.to_motion(result.unknowns)
         motion = full_stride(motion) if self.config.half_cycle else motion
         return GaitSolution(
-            config=self.config,
+            case=self.case,
             walker=self.walker,
             status=status,
             last_motion=motion,
@@ -399,9 +404,9 @@ def _within(errors: Reintegration, tolerances: tuple[float, float]) -> bool:
 
 
 def solve_study(
-    config: StudyConfig,
+    study: StudyConfig | Case,
     warm_start: PhasedMotion | None = None,
     observer: StageObserver | None = None,
 ) -> GaitSolution:
-    """Build and solve a study; see `GaitSolver`."""
-    return GaitSolver(config, observer).solve(warm_start)
+    """Build and solve a study, whose patient is read if it is a config; see `GaitSolver`."""
+    return GaitSolver(Case.of(study), observer).solve(warm_start)

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.neighbourhood import Neighbourhood
@@ -185,7 +185,7 @@ def verdict_of(solution: GaitSolution) -> Verdict | None:
     if config.half_cycle or config.transcription != "collocation":
         return None
     began = time.perf_counter()
-    resolver = Resolver(config, solution.last_motion, solution.nlp.multipliers)
+    resolver = Resolver(solution.case, solution.last_motion, solution.nlp.multipliers)
     judge = _Judge(resolver)
     if not judge.around.springs or not judge.optimum.converged:
         return None
@@ -304,8 +304,8 @@ class _Judge:
         """Return the neighbour with some springs prescribed."""
         held = {name: [value, value] for name, value in springs.items()}
         values = {**self.config.bounds.model_dump(mode="json")["stiffness"], **held}
-        config = with_values(self.config, {"bounds.stiffness": values})
-        return self.resolver.resolve(config, start, insist)
+        case = self.optimum.case.with_values({"bounds.stiffness": values})
+        return self.resolver.resolve(case, start, insist)
 
     def snapped(self) -> SnappedSprings | None:
         """Return the best choice among the springs that exist, solved again."""
