@@ -668,7 +668,8 @@ if __name__ == "__main__":
 def test_workers_end_with_their_parent(tmp_path: Path, number: signal.Signals) -> None:
     script = tmp_path / "hanging.py"
     script.write_text(HANGING, encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    places = [str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(places)}
     command = [sys.executable, script, tmp_path]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment,
                           start_new_session=True) as parent:  # fmt: skip

@@ -347,7 +347,7 @@ def test_an_error_of_the_disk_is_told_with_its_place_and_what_to_do(
         with atomic_open(tmp_path / "points.npz"):
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("pathwalker_cli.commands.solve._study", fail)
+    monkeypatch.setattr("pathwalker_cli.commands.solve._case", fail)
     result = CliRunner().invoke(cli, ["solve", "mapd-healthy", "mapd-healthy"])
     expected = f"Error: {tmp_path}/points.npz: No space left on device; make room, then call again"
     assert result.output.strip() == expected

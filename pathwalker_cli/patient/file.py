@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
@@ -120,6 +120,11 @@ class Patient(YamlModel):
                 mend="add heel and toe of the shoe's sole, [x, z] in m from the ankle",
             )
         return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel to other processes as JSON: the classes of pairs of sides have no name there."""
+        content = self.model_dump_json(exclude_none=True)
+        return _travelled, (content, self._origin, self._changes)
 
     @property
     def source(self) -> Path | None:
@@ -231,6 +236,13 @@ class Patient(YamlModel):
     def _lacks(self, key: str, mend: str) -> PatientError:
         where = str(self.source) if self.source else f"patient {self.id}"
         return PatientError(f"{key} is not given", where=where, mend=mend)
+
+
+def _travelled(content: str, origin: _Origin, changes: tuple[str, ...]) -> Patient:
+    """Return a patient that comes from another process."""
+    patient = Patient.model_validate_json(content, strict=True)
+    patient._origin, patient._changes = origin, changes
+    return patient
 
 
 def shipped_patients() -> tuple[str, ...]:
