@@ -44,7 +44,7 @@ FORBIDDEN = re.compile(
     re.IGNORECASE,
 )
 TOKEN = re.compile(r"@[A-Z][A-Z0-9_]*@")
-# A backticked name below the package, e.g. `model.muscle.activation_rate`.
+# A backticked name below the package, e.g. `model.elements.muscle.activation_rate`.
 NAME = re.compile(
     r"`((?:model|nlp|ocp|gait|stride|patient|inverse|io|conventions|config)(?:\.\w+)+)`"
 )
@@ -241,7 +241,8 @@ def test_theory_states_the_phases_as_they_are() -> None:
     assert [name for name, _ in rows] == [phase.name for phase in PHASES]
     following = PHASES[1:] + PHASES[:1]
     for (_, cells), phase, after in zip(rows, PHASES, following, strict=True):
-        wanted = (phase.forces, phase.touched_down(after), phase.lifted_off(after))
+        parts = (phase.forces, phase.touched_down(after), phase.lifted_off(after))
+        wanted = tuple(tuple(force.name for force in part) for part in parts)
         for cell, forces in zip(cells.split("|"), wanted, strict=True):
             assert spelled_out(cell) == set(forces)
 

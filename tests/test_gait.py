@@ -25,7 +25,6 @@ from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.stride.series import actuator_torques
 
 CHILD = str(Path(__file__).parent / "data" / "child-10y" / "patient.yaml")
 
@@ -42,7 +41,7 @@ def solver() -> GaitSolver:
 @pytest.fixture(scope="module")
 def program(solver: GaitSolver) -> CollocationProgram:
     motion = solver.stride.motion(
-        solver.walker, solver.stiffness_guess(), meshing.uniform([2] * 8), 3
+        solver.walker, solver.parameter_guess(), meshing.uniform([2] * 8), 3
     )
     numbers = solver.numbers(solver.weights, solver.bounds.table)
     return CollocationProgram(solver.blocks, numbers, motion.meshes)
@@ -51,8 +50,8 @@ def program(solver: GaitSolver) -> CollocationProgram:
 def test_phases_touch_down_and_lift_off_once() -> None:
     following = PHASES[1:] + PHASES[:1]
     pairs = list(zip(PHASES, following, strict=True))
-    down = [force for a, b in pairs for force in a.touched_down(b)]
-    up = [force for a, b in pairs for force in a.lifted_off(b)]
+    down = [force.name for a, b in pairs for force in a.touched_down(b)]
+    up = [force.name for a, b in pairs for force in a.lifted_off(b)]
     assert sorted(down) == ["heel_l_x", "heel_l_z", "heel_r_x", "heel_r_z", "toe_l_z", "toe_r_z"]
     assert sorted(up) == ["heel_l_z", "heel_r_z", "toe_l_x", "toe_l_z", "toe_r_x", "toe_r_z"]
 
@@ -81,13 +80,14 @@ def test_frozen_curves_give_the_torques_and_their_derivatives(solver: GaitSolver
 
 def test_fast_torques_are_those_of_the_walker(solver: GaitSolver) -> None:
     rng = np.random.default_rng(2)
-    torques = actuator_torques(solver.walker)
+    walker = solver.walker.with_parameters([40, 50, 10, 20])
     for _ in range(20):
         q, v, a = 0.3 * rng.normal(size=10), 3 * rng.normal(size=10), rng.uniform(size=14)
-        muscle, orthosis = (np.asarray(k).ravel() for k in torques(q, v, a, [40, 50, 10, 20]))
-        assert muscle == pytest.approx(solver.walker.muscle_torques(q, v, a), abs=1e-10)
-        wanted = solver.walker.orthosis_torques(q, (40, 50), (10, 20))
-        assert orthosis == pytest.approx(wanted, abs=1e-10)
+        forces, tau = (np.asarray(k).ravel() for k in walker.force_function(q, v, a))
+        muscle = solver.walker.muscle_torques(q, v, a)
+        orthosis = solver.walker.orthosis_torques(q, (40, 50), (10, 20))
+        assert forces == pytest.approx(np.concatenate([muscle, orthosis]), abs=1e-10)
+        assert tau == pytest.approx(walker.joint_torques(muscle, orthosis), abs=1e-10)
 
 
 def test_no_row_and_no_unknown_is_constrained_twice(program: CollocationProgram) -> None:
@@ -120,9 +120,9 @@ def test_stylised_stride_stands_on_the_ground(solver: GaitSolver) -> None:
     for i, phase in enumerate(PHASES):
         for share in (0.1, 0.5, 0.9):
             points = solver.walker.contact_points(solver.stride.coordinates(i, share))
-            for name in phase.points:
-                row = ("heel_r", "toe_r", "heel_l", "toe_l").index(name)
-                assert abs(points[row, 1]) < 0.02, (phase.name, name, share)
+            for point in phase.points:
+                row = ("heel_r", "toe_r", "heel_l", "toe_l").index(point.name)
+                assert abs(points[row, 1]) < 0.02, (phase.name, point.name, share)
 
 
 def test_recorded_stride_is_closed_and_begins_at_left_toe_off(solver: GaitSolver) -> None:

@@ -15,7 +15,9 @@ PACKAGE = Path(pathwalker_cli.__file__).parent
 ROOT = "pathwalker_cli"
 
 LAYERS = (
-    {"conventions", "errors", "paths", "versions"},
+    {"errors", "paths", "versions", "model.skeleton"},
+    {"model.contact", "model.numbers"},
+    {"conventions"},
     {"trajectory"},
     {"io"},
     {"patient.blocks", "patient.proportions"},

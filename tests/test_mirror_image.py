@@ -40,8 +40,8 @@ def image_of(stride: PhasedMotion) -> PhasedMotion:
 def turned(phase: PhaseMotion, i: int, shift: float, costs: np.ndarray) -> PhaseMotion:
     """Return phase i with left and right exchanged, elsewhere."""
     here, there = PHASES[i], PHASES[(i + HALF) % len(PHASES)]
-    names = ACCELERATIONS + here.forces + RESERVES
-    order = [names.index(mirrored(n)) for n in ACCELERATIONS + there.forces + RESERVES]
+    names = ACCELERATIONS + here.force_names + RESERVES
+    order = [names.index(mirrored(n)) for n in ACCELERATIONS + there.force_names + RESERVES]
     of_states = mirror_permutation(COORDINATES + VELOCITIES)
     states, inner = phase.states[:, of_states], phase.inner_states[..., of_states]
     states[:, 0] += shift

@@ -24,7 +24,7 @@ from pathwalker_cli.gait.shooting import (
 )
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.contact import PHASES
-from pathwalker_cli.model.muscle import (
+from pathwalker_cli.model.elements.muscle import (
     ACTIVATION_TIME,
     DEACTIVATION_TIME,
     activation_rate,

@@ -61,7 +61,7 @@ def steps(
     case = load_case(problem, changes=(*mesh, f"solver.max_iterations={tracking}"))
     solver, config = GaitSolver(case), case.config
     tracked, result = solver._track()
-    motion = replace(tracked.to_motion(result.unknowns), parameters=solver.stiffness_guess())
+    motion = replace(tracked.to_motion(result.unknowns), parameters=solver.parameter_guess())
     if variant == "casadi":
         blocks.kernels = lambda: None
     program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)

@@ -12,7 +12,11 @@ import numpy as np
 from pathwalker_cli.conventions import GENERATORS
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.gait.problem import GaitProblem
-from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME, excitation_from_rate
+from pathwalker_cli.model.elements.muscle import (
+    ACTIVATION_TIME,
+    DEACTIVATION_TIME,
+    excitation_from_rate,
+)
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import ProblemNumbers, Variables

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
@@ -62,6 +62,7 @@ class LocalOptimum:
         cost: Value of the objective.
         walking_speed: Walking speed [m/s].
         stiffness: K_D right, left, K_P right, left [N m/rad]; empty when barefoot.
+        numbers: Value of every number that was free to choose, by name [SI].
         iterations: Iterations over all stages.
         seconds: Wall seconds.
     """
@@ -74,6 +75,7 @@ class LocalOptimum:
     stiffness: tuple[float, ...]
     iterations: int
     seconds: float
+    numbers: dict[str, float] = field(default_factory=dict)
 
     @property
     def converged(self) -> bool:

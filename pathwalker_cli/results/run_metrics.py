@@ -81,6 +81,22 @@ def stiffness_ranges(solution: GaitSolution) -> dict[str, tuple[float, float]]:
     return {name: pair for name, pair in found.items() if pair is not None}
 
 
+def unknowns(solution: GaitSolution) -> list[dict[str, Any]]:
+    """Return every number that was free to choose: name, place, value, unit and range."""
+    return [
+        {
+            "name": unknown.name,
+            "place": unknown.address,
+            "value": value,
+            "unit": unknown.unit,
+            "range": solution.bounds.ranges[unknown.name],
+        }
+        for unknown, value in zip(
+            solution.walker.unknowns, solution.last_motion.parameters.tolist(), strict=True
+        )
+    ]
+
+
 def run_metrics(solution: GaitSolution, inputs: RunInputs) -> dict[str, Any]:
     """Return all metrics, ready for strict JSON: SI units, None for what is not a number."""
     began = time.perf_counter()
@@ -133,6 +149,7 @@ def _proof(solution: GaitSolution, residual: float) -> dict[str, Any]:
         "shortfall": None if solution.shortfall is None else solution.shortfall.as_dict(),
         "active_bounds": [str(bound) for bound in solution.active],
         "stiffness_ranges": stiffness_ranges(solution),
+        "unknowns": unknowns(solution),
         "bound_sources": solution.bounds.sources,
         "notes": solution.walker.patient.notes,
     }

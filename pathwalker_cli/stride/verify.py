@@ -12,13 +12,13 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
 
-from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES
-from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
+from pathwalker_cli.model.contact import POINTS
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.nlp.taped import Columns
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
-from pathwalker_cli.stride.series import GaitSeries, actuator_torques
+from pathwalker_cli.stride.series import GaitSeries
 
 __all__ = [
     "ActiveBound",
@@ -176,15 +176,16 @@ def reintegrate(walker: Walker, motion: PhasedMotion, tolerance: float = 1e-9) -
     unknowns of the program; activations follow from their rates.
 
     Args:
-        walker: The walker.
+        walker: The walker; its unknowns take the values of the motion's parameters.
         motion: Its motion.
         tolerance: Relative tolerance of the integrator.
     """
-    n, torques = len(COORDINATES), Columns(actuator_torques(walker))
+    walker = walker.with_parameters(motion.parameters)
+    n, forces = walker.skeleton.size, Columns(walker.force_function)
     terms = Columns(walker.dynamics_terms)
     positions, velocities = [], []
     for phase in motion.phases:
-        errors = _interval_errors(walker, torques, terms, phase, motion.parameters, tolerance)
+        errors = _interval_errors(walker, forces, terms, phase, tolerance)
         positions.append(errors[:, :n].max(axis=1))
         velocities.append(errors[:, n:].max(axis=1))
     return Reintegration(tuple(positions), tuple(velocities))
@@ -192,29 +193,24 @@ def reintegrate(walker: Walker, motion: PhasedMotion, tolerance: float = 1e-9) -
 
 def _interval_errors(
     walker: Walker,
-    torques: Columns,
+    forces: Columns,
     terms: Columns,
     phase: PhaseMotion,
-    stiffness: np.ndarray,
     tolerance: float,
 ) -> np.ndarray:
     """Return the absolute errors of q and v at the end of every interval, shape (N, 20).
 
     All intervals of a phase are integrated side by side, each over its own share of time.
     """
-    n, count = len(COORDINATES), phase.intervals
+    n, count = walker.skeleton.size, phase.intervals
     starts, steps = phase.mesh[:-1], np.diff(phase.mesh)
-    parameters = np.tile(np.asarray(stiffness)[:, None], count)
 
     def rate(share: float, stacked: np.ndarray) -> np.ndarray:
         state = stacked.reshape(count, 2 * n)
         q, v = state[:, :n], state[:, n:]
         activation = phase.smooth_at(starts + steps * share)
-        muscle, orthosis = torques(q.T, v.T, activation.T, parameters)
-        tau = np.zeros((n, count))
-        np.add.at(tau, list(GENERATOR_ROWS), np.asarray(muscle))
-        np.add.at(tau, list(ANKLES), np.asarray(orthosis))
-        vdot, _ = walker.contact_dynamics_series(phase.name, q, v, tau.T, terms)
+        _, tau = forces(q.T, v.T, activation.T)
+        vdot, _ = walker.contact_dynamics_series(phase.name, q, v, np.asarray(tau).T, terms)
         return np.asarray(phase.duration * steps[:, None] * np.hstack([v, vdot])).ravel()
 
     inside = 1 - 1e-12  # the end itself belongs to the next interval
@@ -239,22 +235,20 @@ def second_engine_residual(series: GaitSeries) -> float:
     """
     walker = series.walker
     model, data = walker.model, walker.model.createData()
+    elements = walker.element_forces(series.q, series.v, series.activation)
+    given = walker.generalised_forces(elements) + series.reserve
     worst = 0.0
     for k in range(len(series.time)):
         q = np.array(series.q[k])
-        muscle = walker.muscle_torques(q, series.v[k], series.activation[k])
-        stiffness = series.stiffness if series.stiffness.size else np.ones(4)
-        orthosis = walker.orthosis_torques(q, stiffness[:2], stiffness[2:])
         needed = pin.rnea(model, data, q, np.array(series.v[k]), np.array(series.vdot[k]))
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
-        for i, point in enumerate(CONTACT_POINTS):
+        for i, point in enumerate(POINTS):
             jacobian = pin.getFrameJacobian(
-                model, data, model.getFrameId(point), pin.LOCAL_WORLD_ALIGNED
+                model, data, model.getFrameId(point.name), pin.LOCAL_WORLD_ALIGNED
             )
             needed = needed - jacobian[[0, 2]].T @ series.force[k, 2 * i : 2 * i + 2]
-        residual = needed - walker.joint_torques(muscle, orthosis) - series.reserve[k]
-        worst = max(worst, float(np.abs(residual).max()))
+        worst = max(worst, float(np.abs(needed - given[k]).max()))
     return worst
 
 
@@ -265,7 +259,7 @@ def equation_residual(series: GaitSeries, walker: Walker) -> float:
         series: The stride.
         walker: The same walker, of any back end.
     """
-    body, n = walker.rigid_body, len(COORDINATES)
+    body, n = walker.rigid_body, walker.skeleton.size
     q, v, vdot, force = (ca.SX.sym(name, k) for name, k in (("q", n), ("v", n), ("a", n), ("f", 8)))
     theta = ca.DM(body.parameters)
     balance = body.inverse_dynamics(q, v, vdot, theta) - body.point_jacobian(q, theta).T @ force
