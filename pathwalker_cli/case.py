@@ -7,13 +7,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pathwalker_cli.config import StudyConfig, load_config, with_values
 from pathwalker_cli.errors import PatientError
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.variation import varied
+
+if TYPE_CHECKING:
+    from pathwalker_cli.model.walker import Walker
 
 __all__ = ["Case", "config_text", "load_case"]
 
@@ -57,6 +60,22 @@ class Case:
             PatientError: If the patient that results is refused.
         """
         return varied(self.unvaried, self.config.variation)
+
+    def walker(self, backend: str = "auto") -> Walker:
+        """Return the walking model of the patient in the condition of the problem.
+
+        Args:
+            backend: Dynamics back end, see `model.backends`.
+
+        Raises:
+            PatientError: If the patient lacks strengths or an orthosis that is worn.
+            ConfigError: If a number is to be free that does not exist.
+        """
+        from pathwalker_cli.model.walker import build_walker  # takes long: only who needs it
+
+        config = self.config
+        free = tuple(config.free)
+        return build_walker(self.patient, config.condition, config.model.published, backend, free)
 
     def with_values(self, values: Mapping[str, Any], where: str = "") -> Case:
         """Return the case with other values in its config; see `config.with_values`.

@@ -20,10 +20,10 @@ from pathwalker_cli.evaluation.run import gaits_of_runs
 from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.evaluation.traces import lone_trace, traces
 from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report.compare import Compared, compare_runs
 from pathwalker_cli.report.compare_text import comparison_lines
-from pathwalker_cli.stride.verify import ActiveBound
 from report_runs import write_made_run
 
 CHILD = Path(__file__).parent / "data" / "child-10y" / "patient.yaml"

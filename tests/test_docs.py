@@ -204,9 +204,10 @@ def test_no_page_tells_of_the_workshop(path: Path) -> None:
         assert not FORBIDDEN.search(line), f"line {number}: {line}"
 
 
-def test_every_name_in_the_theory_exists() -> None:
-    names = NAME.findall(text_of("docs/theory.md"))
-    assert len(names) > 40
+@pytest.mark.parametrize(("page", "least"), [("theory", 40), ("numerics", 25)])
+def test_every_name_in_the_theory_exists(page: str, least: int) -> None:
+    names = NAME.findall(text_of(f"docs/{page}.md"))
+    assert len(names) > least
     assert [name for name in names if not resolves(name)] == []
 
 
@@ -304,6 +305,21 @@ def test_python_page_runs() -> None:
     exec("\n".join(imports), names)
     exec(others[-1], names)
     assert {"solve_study", "run_study", "load_run"} <= names.keys()
+
+
+def test_numerics_page_solves_its_example() -> None:
+    solve, follow = blocks("docs/numerics.md", "python")
+    names: dict[str, Any] = {}
+    exec(solve, names)
+    assert names["result"].converged
+    assert names["result"].objective == pytest.approx(12.0, rel=1e-9)
+    wanted = 6.0 - 12.0 * np.linspace(0.0, 1.0, 5)
+    assert names["motion"].phases[0].smooth[:, 0] == pytest.approx(wanted, abs=1e-8)
+    exec(follow, names)
+    answer = names["KktSystem"](names["program"], names["result"]).answer(
+        names["below"], names["above"], 1e-4
+    )
+    assert answer.cost == pytest.approx(24.0, rel=1e-6)
 
 
 def test_citation_is_complete_and_of_this_version() -> None:

@@ -67,8 +67,7 @@ def case_of(patient: Patient) -> Case:
 def cost_of(solver: GaitSolver, motion: PhasedMotion) -> float:
     """Return the cost of a motion."""
     program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)
-    parameters = program.program.parameters(solver.prediction.shared)
-    return float(program.program.functions()["nlp"](program.to_unknowns(motion), parameters)[0])
+    return float(program.functions["nlp"](program.to_unknowns(motion), program.parameters)[0])
 
 
 def test_the_solution_of_the_mirror_image_is_mirrored() -> None:

@@ -11,7 +11,6 @@ import numpy as np
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.results.run_folder import Run, load_run
 from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.series import GaitSeries, gait_series
@@ -76,9 +75,7 @@ def stride_of_run(folder: str | Path) -> tuple[Run, GaitSeries]:
             where=str(folder),
             allowed="a stride of both legs in eight phases",
         )
-    config = run.config
-    walker = build_walker(run.case.patient, config.condition, config.model.published)
-    return run, gait_series(walker, run.motion)
+    return run, gait_series(run.case.walker(), run.motion)
 
 
 def run_notes(run: Run) -> tuple[str, ...]:

@@ -60,7 +60,7 @@ class Neighbourhood:
     @cached_property
     def _scale(self) -> np.ndarray:
         """Size of a solver unit of every free unknown."""
-        return np.asarray(self.optimum.program.layout.scale[self.kkt.free])
+        return np.asarray(self.optimum.program.scale[self.kkt.free])
 
     @cached_property
     def cost_gradient(self) -> np.ndarray:

@@ -166,7 +166,7 @@ class Resolver:
         self._program = self._program_of(self._solver)
         self._warm_solvers: dict[WarmStart, NlpSolver] = {}
         self._multipliers = multipliers
-        if multipliers is not None and multipliers.rows.size != self._program.program.rows:
+        if multipliers is not None and multipliers.rows.size != self._program.rows:
             self._multipliers = None
 
     @classmethod
@@ -235,9 +235,8 @@ class Resolver:
 
 def warm_start_for(program: CollocationProgram, start: np.ndarray) -> WarmStart:
     """Return how to begin with this start: by how much it misses rows and bounds."""
-    nlp = program.program
-    (_, rows) = nlp.functions()["nlp"](start, program.parameters)
-    missed = _outside(np.asarray(rows).ravel(), nlp.lower, nlp.upper)
+    (_, rows) = program.functions["nlp"](start, program.parameters)
+    missed = _outside(np.asarray(rows).ravel(), *program.row_bounds)
     rms = float(np.sqrt(np.mean(missed**2)))
     beyond = float(_outside(start, *program.bounds).max())
     if rms > _FURTHER_ROWS:

@@ -14,13 +14,9 @@ from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.stride.series import GaitSeries, gait_series
-from pathwalker_cli.stride.verify import (
-    ActiveBound,
-    Reintegration,
-    Violation,
-    second_engine_residual,
-)
+from pathwalker_cli.stride.verify import Reintegration, second_engine_residual
 
 __all__ = ["TOO_WEAK", "GaitSolution", "LocalOptimum", "StageRecord"]
 

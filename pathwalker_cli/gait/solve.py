@@ -28,19 +28,15 @@ from pathwalker_cli.gait.start import ReferenceStride, reference_stride, start_r
 from pathwalker_cli.gait.structures import gait_blocks
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
 from pathwalker_cli.model.numbers import Unknown
-from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
+from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
+from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers, Sample
+from pathwalker_cli.ocp.violations import active_bounds, largest_violations
 from pathwalker_cli.stride.series import gait_series
-from pathwalker_cli.stride.verify import (
-    Reintegration,
-    active_bounds,
-    largest_violations,
-    reintegrate,
-)
+from pathwalker_cli.stride.verify import Reintegration, reintegrate
 
 __all__ = ["GaitSolver", "solve_study"]
 
@@ -95,15 +91,8 @@ class GaitSolver:
     def __post_init__(self) -> None:
         """Build walker, bounds and the blocks of the problem."""
         began = time.perf_counter()
-        model, free = self.config.model, self.config.free
-        self.walker = build_walker(
-            self.case.patient,
-            self.config.condition,
-            model.published,
-            model.backend,
-            tuple(free),
-        )
-        self.bounds = gait_bounds(self.walker, self.config.bounds, free)
+        self.walker = self.case.walker(self.config.model.backend)
+        self.bounds = gait_bounds(self.walker, self.config.bounds, self.config.free)
         self.gait = GaitProblem(self.walker, self._form(), self.config.cost.wanted)
         if self.config.start.gait == "recorded":
             _ = self.stride  # a missing recording is refused before anything is built
@@ -212,7 +201,7 @@ class GaitSolver:
             name,
             result.status,
             motion.intervals,
-            program.program.size,
+            program.size,
             result.iterations,
             result.seconds,
             result.seconds_functions,

@@ -16,7 +16,6 @@ import numpy as np
 
 from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import StudyConfig, load_config
-from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.gait.start import start_recording
@@ -26,6 +25,7 @@ from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.recordings import write_recording
 from pathwalker_cli.io.yaml_file import validate
+from pathwalker_cli.model.walker import unknowns_of
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.patient import load_patient, recordings_beside
@@ -305,7 +305,7 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
         _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
     case = _kept_case(folder)
     config = case.config
-    expected = len(STIFFNESSES) if config.condition == "orthosis" else 0
+    expected = len(unknowns_of(config.condition, tuple(config.free)))
     if config.problem != metrics["problem"] or motion.parameters.size != expected:
         where = str(folder / CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)

@@ -1,11 +1,8 @@
-"""Prove a solution: violations by name, active bounds, re-integration, and a second engine."""
+"""Prove a solution: re-integration, and a second engine."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
 
 import casadi as ca
 import numpy as np
@@ -14,136 +11,16 @@ from scipy.integrate import solve_ivp
 
 from pathwalker_cli.model.contact import POINTS
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.nlp.taped import Columns
-from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.stride.series import GaitSeries
 
 __all__ = [
-    "ActiveBound",
     "Reintegration",
-    "Violation",
-    "active_bounds",
     "equation_residual",
-    "largest_violations",
     "reintegrate",
     "second_engine_residual",
 ]
-
-_NEAR = 1e-2
-"""Distance in solver units beyond which a bound is never called active."""
-_PULL = 1e-5
-"""Least multiplier of an active bound: without it the bound does not matter."""
-
-
-_ACTIVE_BOUND: Final = re.compile(
-    r"(?P<name>.+) (?P<side>lower|upper) (?P<value>[-+.\w]+)(?: in (?P<places>.+))?"
-)
-
-
-@dataclass(frozen=True)
-class Violation:
-    """One constraint or bound that is not met.
-
-    Args:
-        name: What and where.
-        amount: By how much, in its own unit.
-    """
-
-    name: str
-    amount: float
-
-
-def largest_violations(
-    program: CollocationProgram, result: NlpResult, count: int = 5
-) -> tuple[Violation, ...]:
-    """Return the largest violations in physical units, largest first; zero ones count too."""
-    nlp, layout = program.program, program.layout
-    lower, upper = program.bounds
-    rows = np.maximum(nlp.lower - result.rows, result.rows - nlp.upper) * nlp.row_scale
-    unknowns = np.maximum(lower - result.unknowns, result.unknowns - upper) * layout.scale
-    both = np.nan_to_num(np.concatenate([rows, unknowns]), nan=np.inf, neginf=0.0).clip(0.0)
-    found = []
-    for i in np.argsort(-both, kind="stable")[:count]:
-        name = nlp.row_name(int(i)) if i < nlp.rows else f"bound of {layout.names[i - nlp.rows]}"
-        found.append(Violation(name, float(both[i])))
-    return tuple(found)
-
-
-@dataclass(frozen=True)
-class ActiveBound:
-    """A bound that holds the solution back.
-
-    Args:
-        name: Quantity, e.g. "knee_r" or "walking_speed".
-        side: "lower" or "upper".
-        value: The bound, in the unit of the quantity.
-        places: Phases in which it is active; empty for the whole motion.
-    """
-
-    name: str
-    side: str
-    value: float
-    places: tuple[str, ...]
-
-    def __str__(self) -> str:
-        """Return e.g. "knee_r lower 0.42 in left_flat, left_toe"."""
-        where = f" in {', '.join(self.places)}" if self.places else ""
-        return f"{self.name} {self.side} {self.value:.4g}{where}"
-
-    @classmethod
-    def parse(cls, text: str) -> ActiveBound:
-        """Return the bound of such a text.
-
-        Raises:
-            ValueError: If it is none.
-        """
-        match = _ACTIVE_BOUND.fullmatch(text)
-        if match is None:
-            raise ValueError(f"'{text}' is no active bound")
-        places = match["places"]
-        return cls(match["name"], match["side"], float(match["value"]),
-                   tuple(places.split(", ")) if places else ())  # fmt: skip
-
-
-def active_bounds(program: CollocationProgram, result: NlpResult) -> tuple[ActiveBound, ...]:
-    """Return the inequality bounds that are active with a multiplier, grouped by name."""
-    groups: dict[tuple[str, str, float], list[str]] = {}
-    costs = program.blocks.problem.integrals
-    for name, where, side, value in _active_entries(program, result):
-        if name in costs:  # a running cost that stays zero holds nothing back
-            continue
-        phases = groups.setdefault((name, side, round(value, 9)), [])
-        phase = "" if where in ("all phases", "the whole motion") else where.split(" ")[0]
-        if phase and phase not in phases:
-            phases.append(phase)
-    return tuple(ActiveBound(*key, tuple(places)) for key, places in sorted(groups.items()))
-
-
-def _active_entries(
-    program: CollocationProgram, result: NlpResult
-) -> Iterator[tuple[str, str, str, float]]:
-    """Yield name, place, side and value of every active bound."""
-    nlp, layout = program.program, program.layout
-    lower, upper = program.bounds
-    for side, limit, gap, pull in (
-        ("lower", lower, result.unknowns - lower, -result.multipliers.unknowns),
-        ("upper", upper, upper - result.unknowns, result.multipliers.unknowns),
-    ):
-        # along the barrier gap times multiplier is constant: active is where the multiplier wins
-        hit = (gap < np.minimum(_NEAR, pull)) & (pull > _PULL) & (upper > lower)
-        for i in np.flatnonzero(hit):
-            name, where = layout.names[i].split(" in ", 1)
-            yield name, where, side, float(limit[i] * layout.scale[i])
-    for side, limit, gap, pull in (
-        ("lower", nlp.lower, result.rows - nlp.lower, -result.multipliers.rows),
-        ("upper", nlp.upper, nlp.upper - result.rows, result.multipliers.rows),
-    ):
-        hit = (gap < np.minimum(_NEAR, pull)) & (pull > _PULL) & (nlp.upper > nlp.lower)
-        for i in np.flatnonzero(hit):
-            name, where = nlp.row_place(int(i))
-            yield name, where, side, float(limit[i] * nlp.row_scale[i])
 
 
 @dataclass(frozen=True)

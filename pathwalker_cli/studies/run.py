@@ -12,7 +12,7 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import DataError, InputError, NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.nlp.ipopt import ProgressReport
+from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.results.run_folder import (
     Run,
     check_target,

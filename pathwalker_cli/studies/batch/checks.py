@@ -11,7 +11,7 @@ from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.passage import recorded_passage
 from pathwalker_cli.gait.start import recorded_stride, start_recording
 from pathwalker_cli.gait.symmetry import require_symmetry
-from pathwalker_cli.model.walker import Walker, build_walker
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.results.run_folder import warm_start_run
 
 __all__ = ["check_case", "check_patient", "check_warm_start"]
@@ -28,12 +28,12 @@ def check_case(name: str, case: Case, where: str) -> None:
     Raises:
         InputError: If the patient lacks what the problem needs, or a value does not fit.
     """
-    config, model = case.config, case.config.model
+    config = case.config
     with placed(f"{where}, case {name}"):
         check_patient(case)
         _check_starts(config)
-        walker = build_walker(case.patient, config.condition, model.published, model.backend)
-        gait_bounds(walker, config.bounds)
+        walker = case.walker(config.model.backend)
+        gait_bounds(walker, config.bounds, config.free)
         _check_start(config, walker)
 
 
