@@ -116,7 +116,7 @@ def test_run_folder_names_every_key_of_the_metrics(made_solution: MadeSolution) 
     groups = (page.OUTCOME, page.gait_keys(), page.PROOF, page.ORIGIN)
     told = {key for group in groups for name in group for key in page.expanded(name)}
     for problem in PROBLEMS:
-        written = set(run_metrics(made_solution(problem), RunInputs({}, "")))
+        written = set(run_metrics(made_solution(problem), RunInputs({})))
         assert told == written | {"verdict", "motion_hash", "multipliers_hash", "metrics_hash"}
 
 

@@ -30,6 +30,7 @@ LAYERS = (
     {"model"},
     {"problems", "patient.variation", "gait.costs"},
     {"config"},
+    {"case"},
     {"stride"},
     {"gait", "inverse", "ocp.solve"},
     {"results"},

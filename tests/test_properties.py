@@ -34,6 +34,7 @@ from made_patients import (
     rows_of,
     similar,
 )
+from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import (
     COORDINATES,
@@ -73,8 +74,6 @@ from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.blocks import OrthosisData
 from pathwalker_cli.results.motion_file import read_motion, write_motion
 from pathwalker_cli.results.orthosis_text import angle_words
-from pathwalker_cli.results.run_folder import config_text
-from pathwalker_cli.results.run_metrics import run_inputs
 from pathwalker_cli.results.text import summary_rows
 from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
 from pathwalker_cli.stride.metrics import gait_metrics
@@ -317,7 +316,7 @@ def test_a_patient_comes_back_from_its_file(patient: Patient, worn: dict[str, An
     orthosis = accepted(worn)
     whole = patient.model_copy(update={"orthosis": orthosis})
     file = folder() / "patient.yaml"
-    file.write_text(run_inputs("", whole).patient, encoding="utf-8")
+    file.write_text(Case(load_config("mapd-orthosis"), whole).patient_text, encoding="utf-8")
     assert load_patient(file).model_dump() == whole.model_dump()
     (folder() / "hinge.yaml").write_text(
         yaml_text(orthosis.model_dump(mode="json", exclude_none=True), "A hinge."), encoding="utf-8"

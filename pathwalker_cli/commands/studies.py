@@ -85,7 +85,7 @@ class StudyCall:
             NotConvergedError: If the base did not converge.
         """
         from pathwalker_cli.commands.progress import Progress
-        from pathwalker_cli.studies.base import base_config, base_run
+        from pathwalker_cli.studies.base import base_case, base_run
         from pathwalker_cli.studies.springs import require_springs
 
         if self.run is not None:
@@ -93,11 +93,11 @@ class StudyCall:
             if springs:
                 require_springs(run.config, f"--run {self.run}")
             return run
-        config = base_config(study)
+        case = base_case(study)
         if springs:
-            require_springs(config, f"base {study.base}")
+            require_springs(case.config, f"base {study.base}")
         with Progress(self.quiet) as progress:
-            return base_run(config, self.out / "base", progress)
+            return base_run(case, self.out / "base", progress)
 
     def report(self, content: Mapping[str, Any], lines: Iterable[str]) -> None:
         """Print what came out, as a document or as lines."""

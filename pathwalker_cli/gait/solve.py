@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.case import Case
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
     gait_bounds,
@@ -27,7 +28,6 @@ from pathwalker_cli.gait.start import ReferenceStride, reference_stride, start_r
 from pathwalker_cli.gait.structures import gait_blocks
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
 from pathwalker_cli.model.numbers import Unknown
-from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
 from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -76,11 +76,11 @@ class GaitSolver:
     """One problem structure, built once; solves it on any mesh with any numbers.
 
     Args:
-        config: The study.
+        case: What is solved, and for whom.
         observer: Called after every iteration with the stage's name.
     """
 
-    config: StudyConfig
+    case: Case
     observer: StageObserver | None = None
     stages: list[StageRecord] = field(default_factory=list)
     seconds: dict[str, float] = field(
@@ -91,13 +91,8 @@ class GaitSolver:
     def __post_init__(self) -> None:
         """Build walker, bounds and the blocks of the problem."""
         began = time.perf_counter()
-        patient = study_patient(self.config)
-        model = self.config.model
-        free = self.config.free
-        self.walker = build_walker(
-            patient, self.config.condition, model.published, model.backend, tuple(free)
-        )
-        self.bounds = gait_bounds(self.walker, self.config.bounds, free)
+        self.walker = self.case.walker(self.config.model.backend)
+        self.bounds = gait_bounds(self.walker, self.config.bounds, self.config.free)
         self.gait = GaitProblem(self.walker, self._form(), self.config.cost.wanted)
         if self.config.start.gait == "recorded":
             _ = self.stride  # a missing recording is refused before anything is built
@@ -105,6 +100,11 @@ class GaitSolver:
             self.bounds = recorded_durations(self.bounds, self.stride.durations)
         self.blocks = gait_blocks(self.gait, self.config.mesh.degree)
         self.seconds["build"] += time.perf_counter() - began
+
+    @property
+    def config(self) -> StudyConfig:
+        """What is solved."""
+        return self.case.config
 
     def _form(self) -> Form:
         """Return what the phases are.
@@ -386,7 +386,7 @@ class GaitSolver:
         motion = program.to_motion(result.unknowns)
         motion = full_stride(motion) if self.config.half_cycle else motion
         return GaitSolution(
-            config=self.config,
+            case=self.case,
             walker=self.walker.with_parameters(motion.parameters),
             status=status,
             last_motion=motion,
@@ -409,9 +409,9 @@ def _within(errors: Reintegration, tolerances: tuple[float, float]) -> bool:
 
 
 def solve_study(
-    config: StudyConfig,
+    study: StudyConfig | Case,
     warm_start: PhasedMotion | None = None,
     observer: StageObserver | None = None,
 ) -> GaitSolution:
-    """Build and solve a study; see `GaitSolver`."""
-    return GaitSolver(config, observer).solve(warm_start)
+    """Build and solve a study, whose patient is read if it is a config; see `GaitSolver`."""
+    return GaitSolver(Case.of(study), observer).solve(warm_start)

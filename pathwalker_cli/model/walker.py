@@ -24,7 +24,7 @@ from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 
-__all__ = ["Walker", "build_walker"]
+__all__ = ["Walker", "build_walker", "unknowns_of"]
 
 _MUSCLES: Final = generators()
 _TISSUE: Final[tuple[ForceElement, ...]] = ()
@@ -393,7 +393,7 @@ def build_walker(
         tissue=_TISSUE,
         device=device,
         values=values,
-        unknowns=_unknowns(device, numbers, free),
+        unknowns=unknowns_of(condition, free),
         published=published,
     )
 
@@ -404,14 +404,21 @@ def _numbers(elements: Sequence[ForceElement], device: Device) -> tuple[Number, 
     return (*of_elements, *device.added_mass.values())
 
 
-def _unknowns(
-    device: Device, numbers: Sequence[Number], free: Sequence[str]
-) -> tuple[Unknown, ...]:
+def unknowns_of(condition: Condition, free: Sequence[str] = ()) -> tuple[Unknown, ...]:
     """Return what a problem chooses: what is asked for, and what a device is there to be found for.
 
     What a device is identified for stands first, per kind right before left, unless both sides
     alike are asked for.
+
+    Args:
+        condition: "barefoot" or "orthosis".
+        free: Addresses of numbers that are asked for.
+
+    Raises:
+        ConfigError: If there is no such number.
     """
+    device = DEVICES[condition]
+    numbers = _numbers((*_MUSCLES, *_TISSUE, *device.forces), device)
     asked = unknowns_at(free, numbers)
     taken = {address for unknown in asked for address in unknown.addresses}
     usual = [

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
-from pathwalker_cli.config import StudyConfig, load_config, smoke_version
+from pathwalker_cli.case import Case, load_case
+from pathwalker_cli.config import smoke_version
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.reproduce.figures import save_paper_figures
@@ -25,7 +27,7 @@ from pathwalker_cli.reproduce.results import (
 )
 from pathwalker_cli.results.run_folder import check_target
 from pathwalker_cli.studies.base import check_folder
-from pathwalker_cli.studies.run import is_done
+from pathwalker_cli.studies.run import done_run
 from pathwalker_cli.versions import versions
 
 __all__ = ["ENTRIES", "ORDER", "PAGE", "SEVERAL", "Solve", "planned_studies", "reproduce"]
@@ -42,24 +44,23 @@ PAGE: Final = "results.md"
 ENTRIES: Final = frozenset({PAGE, "figures", "inverse-dynamics", "runs"})
 """Everything that the folder holds; one with anything else is never written into."""
 
-Solve = Callable[[StudyConfig, Path], None]
+Solve = Callable[[Case, Path], None]
 """Solves a study and writes its run folder, converged or not."""
 Say = Callable[[str], None]
 """Called with one line per step."""
 
 
-def planned_studies(starts: int, quick: bool) -> dict[str, StudyConfig]:
+def planned_studies(starts: int, quick: bool) -> dict[str, Case]:
     """Return the study of every problem, as shipped.
 
     Args:
         starts: Starts of the problems `SEVERAL`.
         quick: Whether coarse meshes without refinement and one start will do.
     """
-    studies = {problem: load_config(problem, problem) for problem in ORDER}
+    cases = {problem: load_case(problem, problem) for problem in ORDER}
     if quick:
-        return {problem: smoke_version(study) for problem, study in studies.items()}
-    several = {p: studies[p].model_copy(update={"starts": starts}) for p in SEVERAL}
-    return studies | several
+        return {p: replace(case, config=smoke_version(case.config)) for p, case in cases.items()}
+    return cases | {problem: cases[problem].with_values({"starts": starts}) for problem in SEVERAL}
 
 
 def reproduce(
@@ -121,17 +122,15 @@ def _inverse(folder: Path, c3d: Path | None, say: Say) -> dict[str, InverseResul
     return results
 
 
-def _solved(
-    folder: Path, studies: Mapping[str, StudyConfig], solve: Solve, say: Say
-) -> dict[str, bool]:
+def _solved(folder: Path, studies: Mapping[str, Case], solve: Solve, say: Say) -> dict[str, bool]:
     """Solve the problems that are not solved yet; return which were."""
     kept = {}
     for name, study in studies.items():
         began, place = time.perf_counter(), folder / name
-        kept[name] = is_done(place, study)
+        kept[name] = done_run(place, study) is not None
         if not kept[name]:
             solve(study, place)
-        done = kept[name] or is_done(place, study)
+        done = kept[name] or done_run(place, study) is not None
         state = "was there" if kept[name] else "converged" if done else "did not converge"
         say(_line(name, state, began))
     return kept

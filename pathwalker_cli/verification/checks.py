@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.cost_terms import cost_terms, goal_values
 from pathwalker_cli.gait.solve import GaitSolver
@@ -19,7 +18,7 @@ from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run, repeatable_config
+from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run
 from pathwalker_cli.results.run_metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.stride.balance import balance
@@ -109,17 +108,16 @@ def verify_run(folder: str | Path) -> Verification:
         NotConvergedError: If the run did not converge.
     """
     run = load_run(folder)
-    config = repeatable_config(run)
-    solver = GaitSolver(config)
+    solver = GaitSolver(run.case)
     series = gait_series(solver.walker, run.motion)
     numbers = gait_metrics(series)
     checks = (
         *_files(run, series),
         *_numbers(run, solver, numbers),
-        *_dynamics(run, config, series, numbers),
+        *_dynamics(run, series, numbers),
         *_solution(run, solver),
     )
-    return Verification(Path(folder), config.problem, solver.walker.patient.id, checks)
+    return Verification(Path(folder), run.config.problem, solver.walker.patient.id, checks)
 
 
 def _files(run: Run, series: GaitSeries) -> Iterator[Check]:
@@ -239,10 +237,9 @@ def _apart(one: Any, two: Any) -> float:
     return 0.0 if one == two else math.inf
 
 
-def _dynamics(
-    run: Run, config: StudyConfig, series: GaitSeries, numbers: GaitMetrics
-) -> Iterator[Check]:
+def _dynamics(run: Run, series: GaitSeries, numbers: GaitMetrics) -> Iterator[Check]:
     """Yield engines, integrator and conservation laws."""
+    config = run.config
     if config.transcription != "collocation":
         yield Check("dynamics", None, 0.0, "", _SHOOTING)
         return

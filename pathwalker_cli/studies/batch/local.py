@@ -47,7 +47,7 @@ class LocalPool:
         waiting = list(tasks)
         for _ in range(ATTEMPTS):
             lost.clear()
-            calls = [(task.config, task.folder, task.warm_start) for task in waiting]
+            calls = [(task.case, task.folder, task.warm_start) for task in waiting]
             with closing(ended_calls(work, calls, self._count, self._time_limit)) as ended:
                 for number, future in ended:
                     name = waiting[number].name
