@@ -24,7 +24,7 @@ from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.patient.blocks import RealSpring
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.studies.edges import Edge, find_edge
-from pathwalker_cli.studies.springs import end_of
+from pathwalker_cli.studies.unknowns import end_of
 
 __all__ = [
     "SHARE",
