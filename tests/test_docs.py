@@ -19,7 +19,7 @@ from pathwalker_cli.cli import COMMANDS
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.gait.goals import GOALS
+from pathwalker_cli.gait.costs import GOALS
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.yaml_file import read_mapping, validate
 from pathwalker_cli.model.contact import PHASES

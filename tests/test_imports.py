@@ -28,7 +28,7 @@ LAYERS = (
     {"patient"},
     {"io.recordings"},
     {"model"},
-    {"problems", "patient.variation", "gait.goals"},
+    {"problems", "patient.variation", "gait.costs"},
     {"config"},
     {"case"},
     {"stride"},

@@ -49,7 +49,7 @@ from pathwalker_cli.conventions import (
 from pathwalker_cli.errors import ConfigError, PatientError
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.goals import Goals
+from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.symmetry import asymmetries, full_stride
 from pathwalker_cli.inverse.recorded_files import write_strengths_yaml
@@ -188,8 +188,8 @@ def test_rows_of_a_mirrored_motion_are_mirrored(patient: Patient, seed: int) -> 
     assert ends == pytest.approx(np.zeros(2 * len(COORDINATES) - 1 + 2 * len(GENERATORS)), abs=1e-9)
 
     gait, image_gait = (GaitProblem(w, "stride", GOALS) for w in (walker, image))
-    terms = cost_terms(stride, gait, WEIGHTS)
-    assert terms == pytest.approx(cost_terms(stride, image_gait, WEIGHTS), rel=1e-12)
+    terms = cost_terms(stride, gait.costs, WEIGHTS)
+    assert terms == pytest.approx(cost_terms(stride, image_gait.costs, WEIGHTS), rel=1e-12)
     series = gait_series(walker, stride)
     image_series = gait_series(image, replace(stride, parameters=swapped))
     half = len(series.time) // 2  # the first instant comes before both steps
@@ -669,7 +669,7 @@ def test_activation_rises_with_excitation(a: float, e: list[float]) -> None:
 def test_discomfort_is_smooth_and_grows_outside_the_range(
     edge: float, width: float, beyond: float
 ) -> None:
-    goals = Goals(("discomfort",), comfort_ranges={"knee_r": (edge - width, edge)})
+    goals = Costs(("discomfort",), comfort_ranges={"knee_r": (edge - width, edge)})
 
     def cost(angle: Any) -> Any:
         q = [0.0] * len(COORDINATES)

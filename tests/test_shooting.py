@@ -15,7 +15,7 @@ from helpers import stylised_series, walker_of
 from pathwalker_cli.case import load_case
 from pathwalker_cli.config import load_config
 from pathwalker_cli.gait.bounds import gait_bounds
-from pathwalker_cli.gait.problem import GaitProblem, GaitWeights
+from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.shooting import (
     EXCITATIONS,
     gait_shooting,
@@ -57,7 +57,9 @@ def _blocks() -> ShootingBlocks:
 @cache
 def _numbers() -> ProblemNumbers:
     walker = walker_of("orthosis")
-    shared = GaitProblem(walker).shared_values(GaitWeights(rate=2e-2, acceleration=1e-3), 0.8)
+    shared = GaitProblem(walker).shared_values(
+        {"effort": 1.0, "rate": 2e-2, "acceleration": 1e-3}, 0.8
+    )
     table = gait_bounds(walker, load_config("mapd-orthosis").bounds).table
     excitations = {(name,): (0.0, 1.0) for name in EXCITATIONS}
     return ProblemNumbers(shared, table.replace(excitations), lambda phase, at: np.zeros(10))

@@ -206,7 +206,7 @@ def test_gait_programs_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None
     config, stride = solver.config, solver.stride
     meshes = meshing.first(stride.durations[: len(solver.gait.phases)], config.mesh)
     program = CollocationProgram(solver.blocks, solver.prediction, meshes)
-    stiffness, costs = solver.parameter_guess(), len(solver.gait.integrals)
+    stiffness, costs = solver.parameter_guess(), len(solver.gait.costs.integrals)
     motion = stride.motion(solver.walker, stiffness, meshes, config.mesh.degree, costs)
     rng = np.random.default_rng(1)
     unknowns = program.to_unknowns(motion) + 0.01 * rng.normal(size=program.size)

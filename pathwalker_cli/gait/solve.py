@@ -18,10 +18,10 @@ from pathwalker_cli.gait.bounds import (
     recorded_durations,
     tracking_bounds,
 )
-from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.goal_costs import with_goal_costs
+from pathwalker_cli.gait.cost_terms import cost_terms, with_goal_costs
+from pathwalker_cli.gait.costs import Weights
 from pathwalker_cli.gait.passage import passage_samples, recorded_passage
-from pathwalker_cli.gait.problem import Form, GaitProblem, GaitWeights
+from pathwalker_cli.gait.problem import Form, GaitProblem
 from pathwalker_cli.gait.shortfall import Shortfall, missing_torques
 from pathwalker_cli.gait.solution import TOO_WEAK, GaitSolution, StageRecord
 from pathwalker_cli.gait.start import ReferenceStride, reference_stride, start_recording
@@ -40,16 +40,16 @@ from pathwalker_cli.stride.verify import Reintegration, reintegrate
 
 __all__ = ["GaitSolver", "solve_study"]
 
-_TRACKING = GaitWeights(effort=0.0, rate=0.0, tracking=10.0, reserve=10.0, smoothing=0.1)
+_TRACKING = {"tracking": 10.0, "reserve": 10.0, "smoothing": 0.1}
 """Weights of the first stage: follow the stride, carried by reserve forces where needed."""
 
 _TRACKING_TOLERANCE, _TRACKING_BARRIER = 1e-2, 0.1
 """A start need not be exact; far from any solution a large barrier takes the fewest iterations."""
 
-_HELPED = GaitWeights(effort=1e-2, rate=2e-4, acceleration=1e-5, reserve=10.0)
+_HELPED = {"effort": 1e-2, "rate": 2e-4, "acceleration": 1e-5, "reserve": 10.0}
 """Weights by which reserves at the joints help a solve that failed: hardly any effort matters."""
 
-_LEAST_HELP = replace(_HELPED, reserve=1e3)
+_LEAST_HELP = {**_HELPED, "reserve": 1e3}
 """Weights of the least help: what is left of the reserves is what the muscles lack."""
 
 _PATIENCE = 400
@@ -120,18 +120,18 @@ class GaitSolver:
         return "step"
 
     @property
-    def weights(self) -> GaitWeights:
-        """Cost weights of the prediction."""
+    def weights(self) -> dict[str, float]:
+        """Weights of the prediction by cost term."""
         cost = self.config.cost
-        return GaitWeights(
-            effort=cost.effort_weight,
-            rate=cost.rate_weight,
-            acceleration=cost.acceleration_weight,
-            walking_speed=cost.walking_speed_weight,
-            fit=cost.fit_weight,
-            excitation=cost.excitation_weight,
-            goals=cost.goals,
-        )
+        return {
+            "effort": cost.effort_weight,
+            "rate": cost.rate_weight,
+            "acceleration": cost.acceleration_weight,
+            "walking_speed": cost.walking_speed_weight,
+            "fit": cost.fit_weight,
+            "excitation": cost.excitation_weight,
+            **cost.goals,
+        }
 
     @property
     def free(self) -> tuple[Unknown, ...]:
@@ -169,7 +169,7 @@ class GaitSolver:
         return np.clip(values, lower, upper)
 
     def numbers(
-        self, weights: GaitWeights, table: BoundTable, orthosis_share: float = 1.0
+        self, weights: Weights, table: BoundTable, orthosis_share: float = 1.0
     ) -> ProblemNumbers:
         """Return the numbers of a stage."""
         friction = self.config.bounds.friction
@@ -246,7 +246,7 @@ class GaitSolver:
         else:
             warm_start = replace(warm_start, phases=warm_start.phases[: len(self.gait.phases)])
             if not config.fits:
-                warm_start = with_goal_costs(warm_start, self.gait.goals, self.walker.weight)
+                warm_start = with_goal_costs(warm_start, self.gait.costs, self.walker.weight)
             kept = config.mesh.refinements > 0
             motion = warm_start if kept else self._first_meshed(warm_start)
             settings = self.settings(loose or solver.tolerance, solver.warm_barrier)
@@ -315,7 +315,7 @@ class GaitSolver:
             self.bounds, stride.durations, dict(zip(names, held.tolist(), strict=True))
         )
         meshes = meshing.first(stride.durations[: len(self.gait.phases)], config.mesh)
-        costs = len(self.gait.integrals)
+        costs = len(self.gait.costs.integrals)
         motion = stride.motion(self.walker, held, meshes, config.mesh.degree, costs)
         settings = self.settings(_TRACKING_TOLERANCE, _TRACKING_BARRIER)
         settings = replace(settings, extra={"barrier_tol_factor": 100.0, **settings.extra})
@@ -393,7 +393,7 @@ class GaitSolver:
             nlp=result,
             bounds=self.bounds,
             cost=result.objective,
-            cost_terms=cost_terms(motion, self.gait, self.weights, self.samples),
+            cost_terms=cost_terms(motion, self.gait.costs, self.weights, self.samples),
             violations=largest_violations(program, result),
             active=active_bounds(program, result),
             reintegration=errors,

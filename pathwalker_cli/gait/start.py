@@ -11,7 +11,6 @@ from scipy.interpolate import CubicSpline
 from pathwalker_cli.config import StartConfig
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, GRAVITY
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.gait.problem import INTEGRALS
 from pathwalker_cli.gait.stylised import StylisedGait, stylised_trajectory
 from pathwalker_cli.io.recordings import CompactRecording, read_recording, start_names
 from pathwalker_cli.model.contact import PHASES
@@ -72,7 +71,7 @@ class ReferenceStride:
         parameters: np.ndarray,
         meshes: tuple[np.ndarray, ...],
         degree: int,
-        integrals: int = len(INTEGRALS),
+        integrals: int,
     ) -> PhasedMotion:
         """Return a start on a mesh: this stride, level activations, weight on the feet.
 

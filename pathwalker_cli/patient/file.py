@@ -88,6 +88,9 @@ class Patient(YamlModel):
     strengths: Strengths | None = None
     orthosis: OrthosisData | None = None
     recorded: dict[Condition, Recorded] = Field(default_factory=dict)
+    numbers: dict[str, Annotated[float, Quantity("SI units", -1e4, 1e4)]] = Field(
+        default_factory=dict
+    )
     _origin: _Origin = PrivateAttr(default=_Origin())
     _changes: tuple[str, ...] = PrivateAttr(default=())
 
@@ -167,12 +170,22 @@ class Patient(YamlModel):
             raise self._lacks("orthosis", "add it, or choose the barefoot condition")
         return self.orthosis
 
-    def number(self, address: str) -> float:
+    def number(self, address: str, default: float | None = None) -> float:
         """Return the number at a place in the file, e.g. "orthosis.neutral_angle.right".
 
+        What has no key of its own stands under its whole address in `numbers`.
+
+        Args:
+            address: The place, the side last where there is one.
+            default: What counts where the file gives none.
+
         Raises:
-            PatientError: If the file gives none there.
+            PatientError: If the file gives none there, and there is no default.
         """
+        place = address.rpartition(".")[0] if address.endswith(SIDES) else address
+        given = self.numbers.get(address, self.numbers.get(place, default))
+        if given is not None:
+            return given
         holder: Any = self
         for part in address.split("."):
             if isinstance(holder, int | float):  # one number for both sides

@@ -12,7 +12,7 @@ from pathwalker_cli.config.values import differing_values
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.quantities import QUANTITIES, Quantity
 from pathwalker_cli.evaluation.run import gaits_of_runs
-from pathwalker_cli.gait.goals import GOALS
+from pathwalker_cli.gait.costs import GOALS
 
 __all__ = ["Compared", "Comparison", "compare_runs"]
 

@@ -14,7 +14,7 @@ import numpy as np
 from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.gait.goal_costs import goal_values
+from pathwalker_cli.gait.cost_terms import goal_values
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.json_file import json_text
 from pathwalker_cli.nlp.kernels import kernels_level

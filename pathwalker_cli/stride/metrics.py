@@ -192,8 +192,9 @@ def _loads(series: GaitSeries) -> dict[str, Any]:
 def _energetics(series: GaitSeries) -> dict[str, Any]:
     """Return the metrics of activation and work."""
     effort = float(series.quadrature @ (series.activation**2).sum(axis=1))
-    count = len(series.walker.muscles)
-    muscle, orthosis = _work(series, slice(count)), _work(series, slice(count, None))
+    walker = series.walker
+    muscle = _work(series, walker.columns(walker.muscles))
+    orthosis = _work(series, walker.columns(walker.device.forces))
     peaks = series.activation.max(axis=0).tolist()
     return {
         "peak_activation": dict(zip(GENERATORS, peaks, strict=True)),
@@ -259,9 +260,9 @@ def _peak_moments(series: GaitSeries) -> dict[str, float]:
     }
 
 
-def _work(series: GaitSeries, elements: slice) -> tuple[float, float]:
+def _work(series: GaitSeries, columns: list[int]) -> tuple[float, float]:
     """Return positive and negative work of some force elements over the stride [J]."""
-    power, weights = series.element_power[:, elements], series.quadrature
+    power, weights = series.element_power[:, columns], series.quadrature
     positive, negative = np.maximum(power, 0.0), np.minimum(power, 0.0)
     return float(weights @ positive.sum(axis=1)), float(weights @ negative.sum(axis=1))
 

@@ -12,8 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.goal_costs import goal_values
+from pathwalker_cli.gait.cost_terms import cost_terms, goal_values
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.special import refuse_special
 from pathwalker_cli.model.walker import build_walker
@@ -193,7 +192,7 @@ def _numbers(run: Run, solver: GaitSolver, numbers: GaitMetrics) -> Iterator[Che
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
     made: dict[str, Any] = numbers.as_dict()
     if run.config.transcription == "collocation":
-        terms = cost_terms(run.motion, solver.gait, solver.weights, solver.samples)
+        terms = cost_terms(run.motion, solver.gait.costs, solver.weights, solver.samples)
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
         made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)
