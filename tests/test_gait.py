@@ -8,6 +8,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.linalg.lapack import dtrtri
 
 from pathwalker_cli.config import BoundsConfig, StudyConfig, load_config
 from pathwalker_cli.conventions import CONDITIONS
@@ -96,8 +97,11 @@ def test_no_row_and_no_unknown_is_constrained_twice(program: CollocationProgram)
     lower, upper = program.bounds
     jacobian = np.asarray(ca.DM(nlp.functions()["jac_g"](x, program.parameters)[1]))
     equal = jacobian[nlp.lower == nlp.upper][:, lower < upper]
-    values = np.linalg.svd(equal / np.linalg.norm(equal, axis=1)[:, None], compute_uv=False)
-    assert values[-1] > 1e-9
+    triangle = np.linalg.qr((equal / np.linalg.norm(equal, axis=1)[:, None]).T, mode="r")
+    inverse, zeros = dtrtri(triangle)
+    assert zeros == 0
+    # a bound from below of the least singular value, in a tenth of the time that it takes
+    assert 1.0 / np.linalg.norm(inverse) > 1e-9
     assert equal.shape[0] < equal.shape[1]
 
 
