@@ -6,6 +6,8 @@ import os
 import socket
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from io import StringIO
+from pathlib import Path
 from typing import Any
 
 os.environ["MPLBACKEND"] = "Agg"
@@ -81,6 +83,35 @@ def _legible_figures() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", checked)
         yield
+
+
+_EMPTY = {
+    "png": b"\x89PNG\r\n\x1a\n",
+    "svg": b'<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1" version="1.1"></svg>',
+}
+
+
+@pytest.fixture
+def sketched(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lay figures out and judge their texts, but save them empty: drawing is what takes long.
+
+    Tests of a module that uses this may be marked `drawn`.
+    """
+    judged: list[Figure] = []
+    if request.node.get_closest_marker("drawn"):
+        return
+
+    def save(self: Figure, file: Any, *, format: str, **_: Any) -> None:
+        if self not in judged:  # its layout is settled when it is saved first
+            found = complaints(self)
+            assert not found, found
+            judged.append(self)
+        if isinstance(file, StringIO):
+            file.write(_EMPTY[format].decode())
+        else:
+            Path(file).write_bytes(_EMPTY[format])
+
+    monkeypatch.setattr(Figure, "savefig", save)
 
 
 def made_result() -> NlpResult:

@@ -7,8 +7,6 @@ import os
 import resource
 import shutil
 import struct
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -21,6 +19,7 @@ from click.testing import CliRunner
 
 from broken import ANGLES, ARCHIVES, EVENTS, HTML, JSON, TABLES, YAML, angles, bomb
 from conftest import MadeSolution
+from helpers import called_apart
 from made_c3d import write_c3d
 from pathwalker_cli.checking.kinds import KINDS
 from pathwalker_cli.checking.recorded import check_orthosis
@@ -42,9 +41,8 @@ from pathwalker_cli.results.run_folder import load_run, write_run
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.batch.cases import load_cases
 
-COMMAND: Final = [sys.executable, "-c", "from pathwalker_cli.cli import main; main()"]
-MEMORY: Final = 6 << 30
-"""Address space of a process that reads broken files; libraries alone take 2 GB."""
+MEMORY: Final = 4 << 30
+"""Address space that a process may take to read broken files, beyond its libraries."""
 THOUGHT: Final = 60
 """CPU time of such a process [s]."""
 
@@ -284,7 +282,8 @@ def test_broken_c3d_files_are_refused_and_kill_nobody(
 
 def limited() -> None:
     """Take memory and time from a process that is about to start."""
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY, taken + MEMORY))
     resource.setrlimit(resource.RLIMIT_CPU, (THOUGHT, THOUGHT))
 
 
@@ -310,11 +309,7 @@ WORST: Final[dict[str, tuple[str, bytes, list[str]]]] = {
 def test_the_worst_in_a_process_with_little_memory(fault: str, tmp_path: Path) -> None:
     name, content, words = WORST[fault]
     written(tmp_path / name, content)
-    done = subprocess.run(
-        [*COMMAND, *words], cwd=tmp_path, capture_output=True, text=True, check=False,
-        timeout=600, preexec_fn=limited,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-    )  # fmt: skip
+    done = called_apart(tmp_path, *words, prepare=limited)
     assert done.returncode == REFUSED, done.stderr
     assert "Error: " in done.stderr
     assert "Traceback" not in done.stderr
