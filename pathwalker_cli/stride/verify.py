@@ -240,9 +240,15 @@ def second_engine_residual(series: GaitSeries) -> float:
     walker = series.walker
     model, data = walker.model, walker.model.createData()
     worst = 0.0
-    for k in range(len(series.time)):
+    drivers = zip(walker.generators, GENERATOR_ROWS, walker.max_isometric_torque, strict=True)
+    muscles = np.column_stack(
+        [
+            generator.torque(series.q[:, row], series.v[:, row], series.activation[:, i], strength)
+            for i, (generator, row, strength) in enumerate(drivers)
+        ]
+    )
+    for k, muscle in enumerate(muscles):
         q = np.array(series.q[k])
-        muscle = walker.muscle_torques(q, series.v[k], series.activation[k])
         stiffness = series.stiffness if series.stiffness.size else np.ones(4)
         orthosis = walker.orthosis_torques(q, stiffness[:2], stiffness[2:])
         needed = pin.rnea(model, data, q, np.array(series.v[k]), np.array(series.vdot[k]))
