@@ -24,7 +24,7 @@ def fake_work(config: str, folder: str, warm_start: str) -> Result:
     if kind == "fails":
         raise ZeroDivisionError("a bug")
     if kind == "hangs":
-        time.sleep(600)
+        time.sleep(3600)
     content = json.loads(config)
     metrics = {
         "status": "the iteration limit was reached" if kind == "is_hard" else "converged",
