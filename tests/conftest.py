@@ -91,15 +91,9 @@ _EMPTY = {
 }
 
 
-@pytest.fixture
-def sketched(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lay figures out and judge their texts, but save them empty: drawing is what takes long.
-
-    Tests of a module that uses this may be marked `drawn`.
-    """
+def sketch(patch: pytest.MonkeyPatch) -> None:
+    """Lay figures out and judge their texts, but save them empty: drawing is what takes long."""
     judged: list[Figure] = []
-    if request.node.get_closest_marker("drawn"):
-        return
 
     def save(self: Figure, file: Any, *, format: str, **_: Any) -> None:
         if self not in judged:  # its layout is settled when it is saved first
@@ -111,7 +105,14 @@ def sketched(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
         else:
             Path(file).write_bytes(_EMPTY[format])
 
-    monkeypatch.setattr(Figure, "savefig", save)
+    patch.setattr(Figure, "savefig", save)
+
+
+@pytest.fixture
+def sketched(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only sketch figures, but in tests that are marked `drawn`."""
+    if not request.node.get_closest_marker("drawn"):
+        sketch(monkeypatch)
 
 
 def made_result() -> NlpResult:
