@@ -17,7 +17,7 @@ import numpy as np
 
 from pathwalker_cli.cli import main
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, Condition
-from pathwalker_cli.gait.problem import INTEGRALS
+from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.gait.stylised import StylisedGait, stylised_trajectory
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 from pathwalker_cli.model.walker import Walker, build_walker
@@ -110,7 +110,7 @@ def _phase(
         for t in (start + duration * mesh, start + duration * points.ravel())
     )
     share = walker.weight / len(contact.points)
-    force = np.array([share * (FRICTION if f.endswith("x") else 1.0) for f in contact.forces])
+    force = np.array([share * (1.0 if f.bears else FRICTION) for f in contact.forces])
     zeros = np.zeros(len(COORDINATES))
     algebraic = np.tile(np.concatenate([zeros, force, zeros]), (INTERVALS, DEGREE, 1))
     return PhaseMotion(
@@ -120,7 +120,7 @@ def _phase(
         states=nodes,
         smooth=np.full((INTERVALS + 1, len(GENERATORS)), ACTIVATION),
         controls=np.zeros((INTERVALS + 1, len(GENERATORS))),
-        integrals=np.zeros((INTERVALS + 1, len(INTEGRALS))),
+        integrals=np.zeros((INTERVALS + 1, len(Costs().integrals))),
         inner_states=inner.reshape(INTERVALS, DEGREE, -1),
         algebraic=algebraic,
     )

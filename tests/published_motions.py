@@ -17,10 +17,11 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
-from pathwalker_cli.conventions import CONTACT_FORCES, GENERATORS, Condition
+from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, Condition
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.model.walker import GENERATOR_ROWS, Walker, build_walker
+from pathwalker_cli.model.elements.muscle import generators
+from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.stride.cycle import BOTH_SIDES
 
@@ -137,8 +138,8 @@ def _augmented(time: np.ndarray) -> dict[str, Any]:
     points = parts[7].reshape(-1, 4, 3)[:, :, [0, 2]]
     assert len(CONTACT_FORCES) == points[0].size
     tau = np.zeros((time.size, 10))
-    for i in range(len(GENERATORS)):
-        tau[:, GENERATOR_ROWS[i]] += torque[:, i]
+    for i, muscle in enumerate(generators()):
+        tau[:, COORDINATES.index(muscle.coordinate)] += torque[:, i]
     return {
         "force": {side: points[:, 2 * i : 2 * i + 2].sum(axis=1)
                   for i, side in enumerate(BOTH_SIDES)},

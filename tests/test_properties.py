@@ -34,6 +34,7 @@ from made_patients import (
     rows_of,
     similar,
 )
+from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import (
     COORDINATES,
@@ -48,7 +49,7 @@ from pathwalker_cli.conventions import (
 from pathwalker_cli.errors import ConfigError, PatientError
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.goals import Goals
+from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.symmetry import asymmetries, full_stride
 from pathwalker_cli.inverse.recorded_files import write_strengths_yaml
@@ -57,8 +58,8 @@ from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.model.anthropometry import segments, total_mass
 from pathwalker_cli.model.contact import PHASE_NAMES, PHASES
-from pathwalker_cli.model.curves import BezierChain, evaluate
-from pathwalker_cli.model.muscle import (
+from pathwalker_cli.model.elements.curves import BezierChain, evaluate
+from pathwalker_cli.model.elements.muscle import (
     ACTIVATION_TIME,
     DEACTIVATION_TIME,
     AndersonCurves,
@@ -66,15 +67,13 @@ from pathwalker_cli.model.muscle import (
     curves_of,
     excitation_from_rate,
 )
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_curve, orthosis_torque
+from pathwalker_cli.model.elements.orthosis import OrthosisSide, orthosis_curve, orthosis_torque
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.blocks import OrthosisData
 from pathwalker_cli.results.motion_file import read_motion, write_motion
 from pathwalker_cli.results.orthosis_text import angle_words
-from pathwalker_cli.results.run_folder import config_text
-from pathwalker_cli.results.run_metrics import run_inputs
 from pathwalker_cli.results.text import summary_rows
 from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
 from pathwalker_cli.stride.metrics import gait_metrics
@@ -189,8 +188,8 @@ def test_rows_of_a_mirrored_motion_are_mirrored(patient: Patient, seed: int) -> 
     assert ends == pytest.approx(np.zeros(2 * len(COORDINATES) - 1 + 2 * len(GENERATORS)), abs=1e-9)
 
     gait, image_gait = (GaitProblem(w, "stride", GOALS) for w in (walker, image))
-    terms = cost_terms(stride, gait, WEIGHTS)
-    assert terms == pytest.approx(cost_terms(stride, image_gait, WEIGHTS), rel=1e-12)
+    terms = cost_terms(stride, gait.costs, WEIGHTS)
+    assert terms == pytest.approx(cost_terms(stride, image_gait.costs, WEIGHTS), rel=1e-12)
     series = gait_series(walker, stride)
     image_series = gait_series(image, replace(stride, parameters=swapped))
     half = len(series.time) // 2  # the first instant comes before both steps
@@ -242,12 +241,13 @@ def test_torques_follow_strengths_and_stiffnesses(
     patient: Patient, factor: float, seed: int
 ) -> None:
     walker = build_walker(patient, "orthosis")
-    stronger = replace(walker, max_isometric_torque=factor * walker.max_isometric_torque)
+    strengths = [muscle.numbers[0].address for muscle in walker.muscles]
+    stronger = walker.with_values({a: factor * walker.values[a] for a in strengths})
     (q, v), a = pose(seed), np.random.default_rng(seed).random(14)
     muscle = walker.muscle_torques(q, v, a)
     close(stronger.muscle_torques(q, v, a), factor * muscle, 1e-13)
     close(walker.muscle_torques(q, v, 0.5 * a), 0.5 * muscle, 1e-13)
-    signs = np.array([g.torque_sign for g in walker.generators])
+    signs = np.array([g.torque_sign for g in walker.muscles])
     assert (signs * muscle >= -1e-12 * np.abs(muscle).max()).all()
     sides = walker.orthosis or ()
     angle, (k_d, k_p) = np.linspace(-0.6, 0.6, 41), np.random.default_rng(seed).uniform(5, 90, 2)
@@ -316,7 +316,7 @@ def test_a_patient_comes_back_from_its_file(patient: Patient, worn: dict[str, An
     orthosis = accepted(worn)
     whole = patient.model_copy(update={"orthosis": orthosis})
     file = folder() / "patient.yaml"
-    file.write_text(run_inputs("", whole).patient, encoding="utf-8")
+    file.write_text(Case(load_config("mapd-orthosis"), whole).patient_text, encoding="utf-8")
     assert load_patient(file).model_dump() == whole.model_dump()
     (folder() / "hinge.yaml").write_text(
         yaml_text(orthosis.model_dump(mode="json", exclude_none=True), "A hinge."), encoding="utf-8"
@@ -669,7 +669,7 @@ def test_activation_rises_with_excitation(a: float, e: list[float]) -> None:
 def test_discomfort_is_smooth_and_grows_outside_the_range(
     edge: float, width: float, beyond: float
 ) -> None:
-    goals = Goals(("discomfort",), comfort_ranges={"knee_r": (edge - width, edge)})
+    goals = Costs(("discomfort",), comfort_ranges={"knee_r": (edge - width, edge)})
 
     def cost(angle: Any) -> Any:
         q = [0.0] * len(COORDINATES)

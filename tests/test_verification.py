@@ -20,7 +20,6 @@ from pathwalker_cli.studies.batch.table import numbers_of, read_metrics
 from pathwalker_cli.verification import checks
 from pathwalker_cli.verification.checks import Verification
 
-
 pytestmark = pytest.mark.usefixtures("sketched")
 
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.integrate import trapezoid
 
-from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, Side
 from pathwalker_cli.inverse.bands import POINTS
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.model.walker import Walker
@@ -155,4 +155,4 @@ class Gait:
 
 def _stands(phase: str, side: Side) -> bool:
     """Return whether a point of a foot is on the ground in a phase."""
-    return any(point.endswith(f"_{SUFFIX[side]}") for point in phase_named(phase).points)
+    return side in phase_named(phase).feet

@@ -8,29 +8,32 @@ controls their rates.  For fixed a, equation (2) increases strictly in the excit
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
-from typing import Final, Literal
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Final, Literal, cast
 
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.conventions import (
-    CONTACT_FORCES,
-    CONTACT_POINTS,
-    COORDINATES,
-    GENERATORS,
-    SIDES,
-    STIFFNESSES,
-)
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
 from pathwalker_cli.gait.boundary import gait_boundary
-from pathwalker_cli.gait.goals import Goals
-from pathwalker_cli.model.contact import PHASES, ContactPhase
-from pathwalker_cli.model.curves import BezierChain, evaluate
-from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME, excitation_from_rate
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
-from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
+from pathwalker_cli.gait.costs import (
+    ACCELERATION_SIZE,
+    FORCE_SIZE,
+    RATE_SIZE,
+    Costs,
+    Instant,
+    Weights,
+)
+from pathwalker_cli.model.contact import FORCES, PHASES, ContactForce, ContactPhase
+from pathwalker_cli.model.elements import element_forces, generalised_forces
+from pathwalker_cli.model.elements.muscle import (
+    ACTIVATION_TIME,
+    DEACTIVATION_TIME,
+    excitation_from_rate,
+)
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.frozen import FrozenTerms
 from pathwalker_cli.ocp.problem import (
     INFINITY,
@@ -42,13 +45,8 @@ from pathwalker_cli.ocp.problem import (
 )
 
 __all__ = [
-    "EXCITATION",
-    "INTEGRALS",
-    "STIFFNESSES",
-    "WEIGHTS",
     "Form",
     "GaitProblem",
-    "GaitWeights",
 ]
 
 VELOCITIES: Final = tuple(f"{name}_velocity" for name in COORDINATES)
@@ -56,167 +54,117 @@ ACCELERATIONS: Final = tuple(f"{name}_acceleration" for name in COORDINATES)
 RESERVES: Final = tuple(f"{name}_reserve" for name in COORDINATES)
 ACTIVATIONS: Final = tuple(f"{name}_activation" for name in GENERATORS)
 RATES: Final = tuple(f"{name}_rate" for name in GENERATORS)
-INTEGRALS: Final = ("effort", "rate", "acceleration", "tracking", "reserve")
-"""Running costs of every gait: the sums of a^2 (or a higher power), (rate / 20)^2, (vdot / 50)^2,
-(q - q_ref)^2 and (reserve / 20)^2."""
-EXCITATION: Final = "excitation"
-"""A further running cost of a passage: the sum of the squared excitations."""
-
 Form = Literal["stride", "step", "passage"]
 """A periodic stride of eight phases, one step of a symmetric gait, or a stride from a recording
 that need not be periodic."""
 
 # What counts as 1 for the solver; with these the prototypes needed the fewest iterations.
-_VELOCITY, _ACCELERATION, _FORCE, _TORQUE = 5.0, 50.0, 100.0, 20.0
-_RATE, _STIFFNESS, _HEIGHT = 20.0, 50.0, 0.1
-
-
-@dataclass(frozen=True)
-class GaitWeights:
-    """Weights of the cost terms.
-
-    Args:
-        effort: Weight of the effort per distance, equation (9).
-        rate: Weight of the squared activation rates per distance (regularisation).
-        acceleration: Weight of the squared accelerations per distance (regularisation).
-        walking_speed: lambda of equation (10).
-        tracking: Weight of the integral of (q - q_ref)^2.
-        reserve: Weight of the integral of the squared reserve forces.
-        smoothing: Weight of the integrals of squared activations and rates, not per distance.
-        fit: Weight of the sum over recorded instants of (q - q_recorded)^2, equation (8).
-        excitation: delta of equation (8), weight of the integral of the squared excitations.
-        goals: Weights of clinical goals by name.
-    """
-
-    effort: float = 1.0
-    rate: float = 1e-3
-    acceleration: float = 0.0
-    walking_speed: float = 0.0
-    tracking: float = 0.0
-    reserve: float = 0.0
-    smoothing: float = 0.0
-    fit: float = 0.0
-    excitation: float = 0.0
-    goals: Mapping[str, float] = field(default_factory=dict)
-
-    def vector(self, goals: Sequence[str] = ()) -> np.ndarray:
-        """Return the weights in the order of `WEIGHTS`, then those of these goals."""
-        own = [getattr(self, name) for name in WEIGHTS]
-        return np.array([*own, *(self.goals.get(name, 0.0) for name in goals)])
-
-
-WEIGHTS: Final = (
-    "effort",
-    "rate",
-    "acceleration",
-    "walking_speed",
-    "tracking",
-    "reserve",
-    "smoothing",
-    "fit",
-    "excitation",
-)
+_VELOCITY, _FORCE, _HEIGHT = 5.0, 100.0, 0.1
 
 
 class _Constants:
     """Symbols of the numbers that a patient and a config bring in, and their values."""
 
-    def __init__(self, walker: Walker, goals: Goals) -> None:
+    def __init__(self, walker: Walker, costs: Costs) -> None:
         body = walker.rigid_body
         self.theta = ca.SX.sym("theta", len(body.parameter_names))
-        self.strength = ca.SX.sym("strength", len(GENERATORS))
+        self.numbers = {number.address: ca.SX.sym(number.full_name) for number in walker.numbers}
         self.friction = ca.SX.sym("friction")
-        self.weights = ca.SX.sym("weights", len(WEIGHTS) + len(goals.names))
-        self.goal_numbers = ca.SX.sym("goal_numbers", goals.size)
-        self._sides = [] if walker.orthosis is None else [ca.SX.sym(s, 7) for s in SIDES]
+        self.weights = ca.SX.sym("weights", len(costs.weighed))
+        self.cost_numbers = ca.SX.sym("cost_numbers", costs.size)
+        free = [unknown for unknown in walker.unknowns if walker.moves_bodies(unknown)]
+        self.slopes = {u.name: ca.SX.sym(f"{u.name}_slope", self.theta.numel()) for u in free}
 
     @property
     def vector(self) -> ca.SX:
         """All constants, one after the other."""
         return ca.vertcat(
             self.theta,
-            self.strength,
+            *self.numbers.values(),
             self.friction,
             self.weights,
-            *self._sides,
-            self.goal_numbers,
+            self.cost_numbers,
+            *self.slopes.values(),
         )
 
-    @property
-    def sides(self) -> tuple[OrthosisSide, ...]:
-        """Symbolic orthosis parameters right and left, or none."""
-        return tuple(OrthosisSide(*ca.vertsplit(side)) for side in self._sides)
-
-    @staticmethod
     def values(
+        self,
         walker: Walker,
-        goals: Goals,
-        weights: GaitWeights,
+        costs: Costs,
+        weights: Weights,
         friction: float,
-        orthosis_share: float,
+        share: float,
     ) -> np.ndarray:
-        """Return the values in the order of `vector`."""
-        sides = [side.scaled(orthosis_share) for side in walker.orthosis or ()]
+        """Return the values in the order of `vector`; of what is faded only a share acts."""
+        numbers = [
+            walker.values[number.address] * (share if number.faded else 1.0)
+            for number in walker.numbers
+        ]
+        free = {unknown.name: unknown for unknown in walker.unknowns}
         return np.concatenate(
             [
                 walker.rigid_body.parameters,
-                walker.max_isometric_torque,
+                numbers,
                 [friction],
-                weights.vector(goals.names),
-                *(list(vars(side).values()) for side in sides),
-                goals.numbers(walker.weight),
+                [weights.get(name, 0.0) for name in costs.weighed],
+                costs.numbers(walker.weight),
+                *(walker.body_slopes(free[name]) for name in self.slopes),
             ]
         )
 
 
-def _curve_expansion(chain: BezierChain, sign: float, x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return value, slope and curvature of a curve of sign * x."""
-    point = evaluate(chain, sign * x)
-    return point.value, sign * point.slope, point.curvature
+def _expansion(
+    function: Callable[..., ca.SX], arguments: Sequence[ca.SX], moving: Sequence[int]
+) -> Callable[..., tuple[ca.SX, ca.SX, ca.SX]]:
+    """Return what gives value, gradient and Hessian of a function in some of its arguments."""
+    if hasattr(function, "expansion") and len(arguments) == 1:
+        return cast("Callable[..., tuple[ca.SX, ca.SX, ca.SX]]", function.expansion)
+    fixed = [i for i in range(len(arguments)) if i not in moving]
 
+    def expanded(*at: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+        x, rest = ca.SX.sym("x", len(moving)), ca.SX.sym("rest", len(fixed))
+        places = {**dict(zip(moving, ca.vertsplit(x), strict=True)),
+                  **dict(zip(fixed, ca.vertsplit(rest), strict=True))}  # fmt: skip
+        value = function(*(places[i] for i in range(len(arguments))))
+        hessian, gradient = ca.hessian(value, x)
+        terms = ca.Function("expansion", [x, rest], [value, gradient, hessian])
+        result = terms(ca.vertcat(*at), ca.vertcat(*(arguments[i] for i in fixed)))
+        return result[0], result[1], result[2]
 
-def _orthosis_expansion(side: OrthosisSide, *arguments: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return orthosis torque, its gradient and its Hessian in angle, K_D and K_P."""
-    x = ca.SX.sym("x", 3)
-    parameters = ca.vertcat(*vars(side).values())
-    torque = orthosis_torque(side, *ca.vertsplit(x))
-    hessian, gradient = ca.hessian(torque, x)
-    terms = ca.Function("orthosis", [x, parameters], [torque, gradient, hessian])
-    value, slope, bend = terms(ca.vertcat(*arguments), parameters)
-    return value, slope, bend
+    return expanded
 
 
 class GaitProblem:
     """Builds the `MultiPhaseProblem` of a walker.
 
     Args:
-        walker: The walker; its condition decides whether there are stiffnesses to find.
+        walker: The walker; its unknowns are the free parameters.
         form: What the phases are.
-        goals: Clinical goals, and the power of the effort.
+        costs: The terms of the objective.
     """
 
-    def __init__(self, walker: Walker, form: Form = "stride", goals: Goals | None = None) -> None:
+    def __init__(self, walker: Walker, form: Form = "stride", costs: Costs | None = None) -> None:
         self.walker = walker
         self.form = form
-        self.goals = goals or Goals()
+        self.costs = replace(costs or Costs(), passage=form == "passage")
         self.phases = PHASES[: len(PHASES) // 2] if form == "step" else PHASES
-        last = (EXCITATION,) if form == "passage" else ()
-        self.integrals = (*INTEGRALS, *self.goals.integrals, *last)
-        self.constants = _Constants(walker, self.goals)
+        self.constants = _Constants(walker, self.costs)
         scale = np.concatenate([np.ones(len(COORDINATES)), np.full(len(COORDINATES), _VELOCITY)])
         self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
         self.activations = Variables.make("a", ACTIVATIONS, 1.0)
-        self.rates = Variables.make("rate", RATES, _RATE)
-        names = STIFFNESSES if walker.orthosis else ()
-        self.stiffness = Variables.make("stiffness", names, _STIFFNESS)
+        self.rates = Variables.make("rate", RATES, RATE_SIZE)
+        names = tuple(unknown.name for unknown in walker.unknowns)
+        sizes = np.array([unknown.scale for unknown in walker.unknowns])
+        self.parameters = Variables.make("parameters", names, sizes)
         self.reference = ca.SX.sym("q_ref", len(COORDINATES))
 
     @property
     def structure(self) -> Hashable:
         """What the expressions depend on; problems of equal structure differ in numbers only."""
         body = self.walker.rigid_body
-        names, worn = tuple(body.parameter_names), self.walker.orthosis is not None
-        return self.form, body.backend, body.topology, names, worn, self.goals.structure
+        names, free = tuple(body.parameter_names), self.walker.unknowns
+        parts = tuple((type(e).__name__, e.name) for e in self.walker.elements)
+        return self.form, body.backend, body.topology, names, parts, free, self.costs.structure
 
     @property
     def q(self) -> ca.SX:
@@ -235,11 +183,11 @@ class GaitProblem:
             states=self.states,
             smooth=self.activations,
             controls=self.rates,
-            parameters=self.stiffness,
+            parameters=self.parameters,
             shared=self.constants.vector,
             point_data=self.reference,
-            integrals=self.integrals,
-            integral_scale=np.ones(len(self.integrals)),
+            integrals=self.costs.integrals,
+            integral_scale=np.ones(len(self.costs.integrals)),
             phases=tuple(self._phase(*pair) for pair in zip(self.phases, following, strict=True)),
             node_rows=self._excitation_rows(),
             boundary=self._boundary(),
@@ -247,38 +195,58 @@ class GaitProblem:
         )
 
     def shared_values(
-        self, weights: GaitWeights, friction: float, orthosis_share: float = 1.0
+        self, weights: Weights, friction: float, orthosis_share: float = 1.0
     ) -> np.ndarray:
         """Return the numbers that go with `MultiPhaseProblem.shared`.
 
         Args:
-            weights: Weights of the cost terms.
+            weights: Weight of every cost term by name.
             friction: Coefficient of friction.
             orthosis_share: Share of the orthosis' fixed torques, below 1 to ease in a start.
         """
-        return self.constants.values(self.walker, self.goals, weights, friction, orthosis_share)
+        return self.constants.values(self.walker, self.costs, weights, friction, orthosis_share)
+
+    @cached_property
+    def _numbers(self) -> dict[str, ca.SX]:
+        """Every named number by address: an unknown, or a constant."""
+        chosen = zip(self.walker.unknowns, ca.vertsplit(self.parameters.symbol), strict=True)
+        free = {address: symbol for unknown, symbol in chosen for address in unknown.addresses}
+        return {**self.constants.numbers, **free}
+
+    @cached_property
+    def _theta(self) -> ca.SX:
+        """Numbers of the rigid bodies, shifted by the unknowns that they depend on."""
+        theta = self.constants.theta
+        for unknown, symbol in zip(
+            self.walker.unknowns, ca.vertsplit(self.parameters.symbol), strict=True
+        ):
+            if unknown.name in self.constants.slopes:
+                home = self.constants.numbers[unknown.addresses[0]]
+                theta = theta + self.constants.slopes[unknown.name] * (symbol - home)
+        return theta
 
     @cached_property
     def _torques(self) -> tuple[ca.SX, FrozenTerms]:
-        """Generalised forces of muscles and orthoses (10,) [N m], with frozen curves."""
-        tau, frozen = ca.SX(len(COORDINATES), 1), FrozenTerms()
-        for i, (g, row) in enumerate(zip(self.walker.generators, GENERATOR_ROWS, strict=True)):
-            angle = partial(_curve_expansion, g.curves.active_torque_angle, g.angle_sign)
-            speed = partial(_curve_expansion, g.curves.torque_angular_velocity, g.torque_sign)
-            factor = frozen.taylor(angle, self.q[row]) * frozen.taylor(speed, self.v[row])
-            peak = g.torque_sign * self.constants.strength[i]
-            tau[row] += peak * self.activations.symbol[i] * factor
-        for i, (side, row) in enumerate(zip(self.constants.sides, ANKLES, strict=False)):
-            springs = self.stiffness.symbol[i], self.stiffness.symbol[i + 2]
-            expansion = partial(_orthosis_expansion, side)
-            tau[row] += frozen.taylor(expansion, self.q[row], *springs)
-        return tau, frozen
+        """Generalised forces of all elements (10,) [N, N m], with frozen curves."""
+        frozen, walker = FrozenTerms(), self.walker
+        moving = ca.vertcat(self.states.symbol, self.activations.symbol, self.parameters.symbol)
+
+        def curve(function: Callable[..., ca.SX], *arguments: ca.SX) -> ca.SX:
+            varying = [i for i, x in enumerate(arguments) if ca.depends_on(ca.SX(x), moving)]
+            expansion = _expansion(function, arguments, varying)
+            return frozen.taylor(expansion, *(arguments[i] for i in varying))
+
+        state = walker.state(*map(ca.vertsplit, (self.q, self.v, self.activations.symbol)))
+        forces = element_forces(walker.elements, state, self._numbers, curve)
+        names = walker.skeleton.coordinates
+        total = generalised_forces(walker.elements, forces, names, ca.SX(1, 1))
+        return ca.vertcat(*total), frozen
 
     def _phase(self, contact: ContactPhase, following: ContactPhase) -> Phase:
-        body, theta = self.walker.rigid_body, self.constants.theta
-        names = ACCELERATIONS + contact.forces + RESERVES
+        body, theta = self.walker.rigid_body, self._theta
+        names = ACCELERATIONS + contact.force_names + RESERVES
         counts = [len(ACCELERATIONS), len(contact.forces), len(RESERVES)]
-        scale = np.repeat([_ACCELERATION, _FORCE, _TORQUE], counts)
+        scale = np.repeat([ACCELERATION_SIZE, _FORCE, FORCE_SIZE], counts)
         z = Variables.make("z", names, scale)
         vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
         tau, frozen = self._torques
@@ -288,11 +256,11 @@ class GaitProblem:
         balance -= jacobian.T @ force
         motion = self._point_motion(vdot)
         residual = Rows.join(
-            Rows.make(balance, tuple(f"{n} equation of motion" for n in COORDINATES), _TORQUE),
+            Rows.make(balance, tuple(f"{n} equation of motion" for n in COORDINATES), FORCE_SIZE),
             Rows.make(
                 motion["acceleration"][active],
-                tuple(f"{n} contact acceleration" for n in contact.forces),
-                _TORQUE,
+                tuple(f"{n} contact acceleration" for n in contact.force_names),
+                FORCE_SIZE,
             ),
         )
         return Phase(
@@ -309,7 +277,7 @@ class GaitProblem:
 
     def _point_motion(self, vdot: ca.SX) -> dict[str, ca.SX]:
         """Return positions, velocities and accelerations of the contact points, (8,) each."""
-        body, theta = self.walker.rigid_body, self.constants.theta
+        body, theta = self.walker.rigid_body, self._theta
         return {
             "position": body.point_positions(self.q, theta),
             "velocity": body.point_velocities(self.q, self.v, theta),
@@ -319,78 +287,76 @@ class GaitProblem:
     def _integrands(
         self, contact: ContactPhase, vdot: ca.SX, force: ca.SX, reserve: ca.SX
     ) -> ca.SX:
-        a, numbers = self.activations.symbol, ca.vertsplit(self.constants.goal_numbers)
-        q, v, activation, load = (ca.vertsplit(x) for x in (self.q, self.v, a, force))
-        terms = [
-            ca.sum1(a**self.goals.activation_power),
-            ca.sumsqr(self.rates.symbol / _RATE),
-            ca.sumsqr(vdot / _ACCELERATION),
-            ca.sumsqr(self.q - self.reference),
-            ca.sumsqr(reserve / _TORQUE),
-            *self.goals.integrands(contact, q, v, activation, load, numbers),
-        ]
-        if EXCITATION in self.integrals:
-            excitation = excitation_from_rate(self.rates.symbol, a)
-            terms.append(ca.sumsqr(excitation))
-        return ca.vertcat(*terms)
+        a, rate = self.activations.symbol, self.rates.symbol
+        columns = (self.q, self.v, a, force, rate, excitation_from_rate(rate, a), vdot, reserve)
+        point = Instant(contact, *(ca.vertsplit(x) for x in (*columns, self.reference)))
+        numbers = ca.vertsplit(self.constants.cost_numbers)
+        return ca.vertcat(*self.costs.integrands(point, numbers))
 
     def _sample(self) -> ca.SX:
         """Return the cost of one recorded instant of a passage."""
-        if self.form != "passage":
+        if not self.costs.passage:
             return ca.SX(0)
-        return self.constants.weights[WEIGHTS.index("fit")] * ca.sumsqr(self.q - self.reference)
+        return self._weights["fit"] * ca.sumsqr(self.q - self.reference)
+
+    @property
+    def _weights(self) -> dict[str, ca.SX]:
+        return dict(zip(self.costs.weighed, ca.vertsplit(self.constants.weights), strict=True))
 
     def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
         """Return heights of the points in the air and the friction cones of the loaded feet."""
-        airborne = [p for p in CONTACT_POINTS if p not in contact.points]
-        heights = [position[CONTACT_FORCES.index(f"{p}_z")] for p in airborne]
+        heights = [f for f in FORCES if f.bears and f.point not in contact.points]
         rows = [
             Rows.make(
-                ca.vertcat(*heights), tuple(f"{p} height" for p in airborne), _HEIGHT, 0.0, INFINITY
+                position[[FORCES.index(f) for f in heights]],
+                tuple(f"{f.point.name} height" for f in heights),
+                _HEIGHT,
+                0.0,
+                INFINITY,
             )
         ]
-        for side in sorted({point[-1] for point in contact.points}):
-            parts = [(n, force[i]) for i, n in enumerate(contact.forces) if n[-3] == side]
-            normal = sum(f for n, f in parts if n.endswith("z"))
-            tangent = sum(f for n, f in parts if n.endswith("x"))
+        for side in sorted(contact.feet):
+            parts = [(f, force[i]) for i, f in enumerate(contact.forces) if f.point.side == side]
+            normal = sum(value for f, value in parts if f.bears)
+            tangent = sum(value for f, value in parts if not f.bears)
             cone = self.constants.friction * normal
-            names = (f"foot_{side} forward friction", f"foot_{side} backward friction")
             value = ca.vertcat(cone - tangent, cone + tangent)
-            rows.append(Rows.make(value, names, _FORCE, 0.0, INFINITY))
+            rows.append(Rows.make(value, _friction_names(side), _FORCE, 0.0, INFINITY))
         return Rows.join(*rows)
 
-    def _touch_down(self, directions: tuple[str, ...], motion: Mapping[str, ca.SX]) -> Rows:
+    def _touch_down(self, directions: Sequence[ContactForce], motion: Mapping[str, ca.SX]) -> Rows:
         """Return the rows that let new points meet the ground without impact and without force.
 
         Zero acceleration of a new point just before contact is the same as zero force just after.
         """
-        index = [CONTACT_FORCES.index(n) for n in directions]
-        vertical = [n for n in directions if n.endswith("z")]
-        lifts = [CONTACT_FORCES.index(n) for n in vertical]
+        lifts = [f for f in directions if f.bears]
+        index = [FORCES.index(f) for f in directions]
         return Rows.join(
             Rows.make(
-                motion["position"][lifts], tuple(f"{n[:-2]} touch-down" for n in vertical), _HEIGHT
+                motion["position"][[FORCES.index(f) for f in lifts]],
+                tuple(f"{f.point.name} touch-down" for f in lifts),
+                _HEIGHT,
             ),
             Rows.make(
                 motion["velocity"][index],
-                tuple(f"{n} touch-down velocity" for n in directions),
+                tuple(f"{f.name} touch-down velocity" for f in directions),
                 1.0,
             ),
             Rows.make(
                 motion["acceleration"][index],
-                tuple(f"{n} touch-down force" for n in directions),
-                _TORQUE,
+                tuple(f"{f.name} touch-down force" for f in directions),
+                FORCE_SIZE,
             ),
         )
 
     @staticmethod
     def _fixed_at_end(contact: ContactPhase, following: ContactPhase) -> tuple[str, ...]:
         """Return the path rows that touch-down or lift-off already fix at the end of a phase."""
-        landing = {n[:-2] for n in contact.touched_down(following)}
-        leaving = {p[-1] for p in contact.points} - {p[-1] for p in following.points}
+        landing = dict.fromkeys(f.point.name for f in contact.touched_down(following))
+        leaving = [side for side in contact.feet if side not in following.feet]
         return (
-            *(f"{p} height" for p in landing),
-            *(f"foot_{s} {d} friction" for s in leaving for d in ("forward", "backward")),
+            *(f"{point} height" for point in landing),
+            *(name for side in leaving for name in _friction_names(side)),
         )
 
     def _excitation_rows(self) -> Rows:
@@ -414,14 +380,11 @@ class GaitProblem:
         )
 
     def _boundary(self) -> Boundary:
-        names = (*WEIGHTS, *self.goals.names)
-        weights = dict(zip(names, ca.vertsplit(self.constants.weights), strict=True))
         return gait_boundary(
             (self.states, self.activations, self.rates),
-            self.stiffness,
-            self.integrals,
-            weights,
-            self.goals,
+            self.parameters,
+            self.costs,
+            self._weights,
             len(self.phases),
             self.form == "step",
             self._standing() if self.form == "passage" else None,
@@ -430,16 +393,21 @@ class GaitProblem:
     def _standing(self) -> Rows:
         """Return the rows that let the first phase begin on the ground and at rest there."""
         contact, motion = self.phases[0], self._point_motion(ca.SX.zeros(len(COORDINATES)))
-        vertical = [n for n in contact.forces if n.endswith("z")]
+        vertical = [f for f in contact.forces if f.bears]
         return Rows.join(
             Rows.make(
-                motion["position"][[CONTACT_FORCES.index(n) for n in vertical]],
-                tuple(f"{n[:-2]} height at the start" for n in vertical),
+                motion["position"][[FORCES.index(f) for f in vertical]],
+                tuple(f"{f.point.name} height at the start" for f in vertical),
                 _HEIGHT,
             ),
             Rows.make(
                 motion["velocity"][list(contact.indices)],
-                tuple(f"{n} velocity at the start" for n in contact.forces),
+                tuple(f"{n} velocity at the start" for n in contact.force_names),
                 1.0,
             ),
         )
+
+
+def _friction_names(side: Side) -> tuple[str, str]:
+    foot = f"foot_{SUFFIX[side]}"
+    return f"{foot} forward friction", f"{foot} backward friction"

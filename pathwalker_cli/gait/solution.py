@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
+from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.gait.bounds import GaitBounds
@@ -13,13 +14,9 @@ from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.stride.series import GaitSeries, gait_series
-from pathwalker_cli.stride.verify import (
-    ActiveBound,
-    Reintegration,
-    Violation,
-    second_engine_residual,
-)
+from pathwalker_cli.stride.verify import Reintegration, second_engine_residual
 
 __all__ = ["TOO_WEAK", "GaitSolution", "LocalOptimum", "StageRecord"]
 
@@ -61,6 +58,7 @@ class LocalOptimum:
         cost: Value of the objective.
         walking_speed: Walking speed [m/s].
         stiffness: K_D right, left, K_P right, left [N m/rad]; empty when barefoot.
+        numbers: Value of every number that was free to choose, by name [SI].
         iterations: Iterations over all stages.
         seconds: Wall seconds.
     """
@@ -73,6 +71,7 @@ class LocalOptimum:
     stiffness: tuple[float, ...]
     iterations: int
     seconds: float
+    numbers: dict[str, float] = field(default_factory=dict)
 
     @property
     def converged(self) -> bool:
@@ -87,7 +86,7 @@ class GaitSolution:
     A solution that did not converge is sealed: `series` raises; `last_iterate` says what it is.
 
     Args:
-        config: What was asked for.
+        case: What was asked for, and for whom.
         walker: Who walks.
         status: "converged" or the reason why not.
         last_motion: The last iterate.
@@ -105,7 +104,7 @@ class GaitSolution:
         shortfall: Why no motion was found, where that was looked for.
     """
 
-    config: StudyConfig
+    case: Case
     walker: Walker
     status: str
     last_motion: PhasedMotion
@@ -121,6 +120,11 @@ class GaitSolution:
     seconds: dict[str, float]
     optima: tuple[LocalOptimum, ...] = ()
     shortfall: Shortfall | None = None
+
+    @property
+    def config(self) -> StudyConfig:
+        """What was asked for."""
+        return self.case.config
 
     @property
     def converged(self) -> bool:

@@ -14,8 +14,7 @@ from typing import Final
 import numpy as np
 from scipy.stats import qmc
 
-from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.case import Case
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, StageRecord
@@ -46,22 +45,22 @@ class _Outcome:
     shortfall: Shortfall | None
 
 
-def spread_starts(config: StudyConfig, solver: GaitSolver) -> list[StudyConfig]:
-    """Return a study for every start; equal seeds give equal starts.
+def spread_starts(solver: GaitSolver) -> list[Case]:
+    """Return a case for every start; equal seeds give equal starts.
 
     Args:
-        config: The study; `starts` says how many.
-        solver: Its solver, which knows the range of speed and stiffnesses.
+        solver: The solver of the study, whose `starts` says how many.
     """
+    config = solver.config
     single = config.model_copy(update={"starts": 1})
-    names = STIFFNESSES if solver.walker.orthosis else ()
-    lower, upper = solver.bounds.table.arrays(names)
+    unknowns = solver.walker.unknowns
+    lower, upper = solver.bounds.table.arrays(tuple(unknown.name for unknown in unknowns))
     low = [*(pair[0] for pair in _SPREAD.values()), _FASTER[0], *lower]
     high = [*(pair[1] for pair in _SPREAD.values()), _FASTER[1], *upper]
     cube = qmc.LatinHypercube(len(low), rng=np.random.default_rng(config.start.seed))
     points = qmc.scale(cube.random(config.starts - 1), low, high)
     studies = [single]
-    for knee_flexion, stride_ratio, faster, *stiffness in points.tolist():
+    for knee_flexion, stride_ratio, faster, *free in points.tolist():
         start = config.start.model_copy(
             update={
                 "gait": "synthetic",
@@ -69,25 +68,26 @@ def spread_starts(config: StudyConfig, solver: GaitSolver) -> list[StudyConfig]:
                 "knee_flexion": knee_flexion,
                 "stride_ratio": stride_ratio,
                 "walking_speed": faster * solver.start_speed,
-                "stiffness": dict(zip(names, stiffness, strict=True)),
+                "stiffness": {},
+                "free": {u.address: value for u, value in zip(unknowns, free, strict=True)},
             }
         )
         studies.append(single.model_copy(update={"start": start}))
-    return studies
+    return [replace(solver.case, config=study) for study in studies]
 
 
-def solve_from_starts(config: StudyConfig, finished: Finished | None = None) -> GaitSolution:
+def solve_from_starts(case: Case, finished: Finished | None = None) -> GaitSolution:
     """Solve a study from all its starts, on as many processes as there are cores.
 
     Args:
-        config: The study.
+        case: The study.
         finished: Called with every local optimum as soon as it is there.
 
     Returns:
         The best solution, with all local optima ordered by cost.
     """
-    solver = GaitSolver(config)
-    outcomes = list(_outcomes(spread_starts(config, solver), finished))
+    solver = GaitSolver(case)
+    outcomes = list(_outcomes(spread_starts(solver), finished))
     outcomes.sort(key=lambda o: (not o.optimum.converged, o.optimum.cost, o.optimum.start))
     best = outcomes[0]
     solver.stages, solver.seconds = list(best.stages), dict(best.seconds)
@@ -97,18 +97,18 @@ def solve_from_starts(config: StudyConfig, finished: Finished | None = None) -> 
     return replace(solution, optima=optima, start=best.optimum.description)
 
 
-def _outcomes(studies: list[StudyConfig], finished: Finished | None) -> Iterator[_Outcome]:
+def _outcomes(cases: list[Case], finished: Finished | None) -> Iterator[_Outcome]:
     """Yield the outcomes of all starts as they come."""
-    workers = min(len(studies), len(os.sched_getaffinity(0)))
-    for outcome in called_elsewhere(_solved, list(enumerate(studies)), workers):
+    workers = min(len(cases), len(os.sched_getaffinity(0)))
+    for outcome in called_elsewhere(_solved, list(enumerate(cases)), workers):
         if finished is not None:
             finished(outcome.optimum)
         yield outcome
 
 
-def _solved(number: int, study: StudyConfig) -> _Outcome:
+def _solved(number: int, case: Case) -> _Outcome:
     """Solve one start in a process of its own."""
-    solver = GaitSolver(study)
+    solver = GaitSolver(case)
     solution = solver.solve()
     last = solution.last_motion
     optimum = LocalOptimum(
@@ -117,9 +117,13 @@ def _solved(number: int, study: StudyConfig) -> _Outcome:
         status=solution.status,
         cost=solution.cost,
         walking_speed=walked_distance(last) / last.duration,
-        stiffness=tuple(last.parameters.tolist()),
+        stiffness=tuple(solution.walker.stiffness.tolist()),
         iterations=solution.iterations,
         seconds=float(sum(solution.seconds.values())),
+        numbers={
+            u.name: float(value)
+            for u, value in zip(solver.walker.unknowns, last.parameters, strict=True)
+        },
     )
     meshes = last.meshes[: len(solver.gait.phases)]
     return _Outcome(

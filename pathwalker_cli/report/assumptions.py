@@ -9,10 +9,10 @@ from typing import Any, Final
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.config.values import changed_values, value_text
 from pathwalker_cli.conventions import LEG_JOINTS, SUFFIX
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.report.content import Section, fact_table
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.results.solve_text import bound_line, interesting, notes_together, source_lines
-from pathwalker_cli.stride.verify import ActiveBound
 
 __all__ = ["assumption_section"]
 

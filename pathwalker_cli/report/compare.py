@@ -12,8 +12,7 @@ from pathwalker_cli.config.values import differing_values
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.quantities import QUANTITIES, Quantity
 from pathwalker_cli.evaluation.run import gaits_of_runs
-from pathwalker_cli.gait.goals import GOALS
-from pathwalker_cli.results.run_folder import load_run
+from pathwalker_cli.gait.costs import GOALS
 
 __all__ = ["Compared", "Comparison", "compare_runs"]
 
@@ -148,8 +147,7 @@ def compare_runs(folders: Sequence[Path]) -> Comparison:
     Raises:
         DataError: If a run is named twice, did not converge or cannot be used.
     """
-    gaits = gaits_of_runs(folders)
-    runs = [load_run(folder) for folder in folders]
+    runs, gaits = zip(*gaits_of_runs(folders), strict=True)
     found = (
         Compared(
             quantity,

@@ -89,7 +89,7 @@ def _springs(run: ReportRun) -> str:
     """Return the springs with how sure they are, sides that agree together."""
     stiffness, verdict = recommended(run), run.verdict
     sure = {name: "prescribed" for name in STIFFNESSES if prescribed(run, name)}
-    sure |= {s.spring: s.determined for s in verdict.springs} if verdict else {}
+    sure |= {s.name: s.determined for s in verdict.springs} if verdict else {}
     parts: dict[str, list[str]] = {}
     for name, value in stiffness.items():
         kind, _, side = measure_of(name).label.rpartition(" ")
@@ -116,8 +116,8 @@ def _warnings(runs: Sequence[ReportRun]) -> list[str]:
             )
         if run.patient_changed:
             found.append(
-                f"{run.label}: the patient's file is no longer that of the run; age, mass, height "
-                "and forces per weight are those of today's file"
+                f"{run.label}: the patient's file is no longer that of the run; this page is about "
+                "the patient of the run"
             )
     return found
 

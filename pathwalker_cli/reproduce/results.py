@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.paper import PATIENT
@@ -104,10 +104,8 @@ def evaluated(
     result = ProblemResult(config.problem, metrics, config, kept)
     if metrics["status"] != "converged":
         return result
-    patient = study_patient(config)
-    walker = build_walker(patient, config.condition, config.model.published)
-    series = gait_series(walker, run.motion)
+    series = gait_series(run.case.walker(), run.motion)
     gait = gait_of_series(series, config.problem, config.problem, metrics["effort"])
-    theirs = recorded.get(config.condition) if patient.id == PATIENT else None
+    theirs = recorded.get(config.condition) if run.case.patient.id == PATIENT else None
     evaluation = evaluate_gait(gait, recorded=theirs)
     return ProblemResult(config.problem, metrics, config, kept, series, evaluation)

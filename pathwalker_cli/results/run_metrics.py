@@ -11,14 +11,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.gait.goal_costs import goal_values
+from pathwalker_cli.gait.cost_terms import goal_values
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.json_file import json_text
-from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.nlp.kernels import kernels_level
-from pathwalker_cli.patient import Patient
 from pathwalker_cli.stride.balance import balance
 from pathwalker_cli.stride.metrics import gait_metrics
 from pathwalker_cli.versions import today, versions
@@ -28,7 +27,6 @@ __all__ = [
     "RUN_FORMAT",
     "RunInputs",
     "metrics_hash",
-    "patient_hash",
     "run_inputs",
     "run_metrics",
     "sha256",
@@ -44,17 +42,15 @@ RUN_FORMAT: Final = 1
 
 @dataclass(frozen=True)
 class RunInputs:
-    """What a run was made from, taken before the solve: files may change while it lasts.
+    """What a run was made from, taken before the solve: an earlier run may change meanwhile.
 
     Args:
         hashes: SHA-256 of the resolved config, of the patient's file, of what is kept of the
             patient, and of an earlier motion.
-        patient: The patient as YAML in one piece.
         warm_start: Run that it began with; "" without one.
     """
 
     hashes: Mapping[str, str]
-    patient: str
     warm_start: str = ""
 
 
@@ -63,40 +59,42 @@ def sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def run_inputs(
-    config_text: str, patient: Patient, warm_start: str | Path | None = None
-) -> RunInputs:
+def run_inputs(case: Case, warm_start: str | Path | None = None) -> RunInputs:
     """Return what a run is made from.
 
     Args:
-        config_text: The resolved config as text.
-        patient: The patient, without variation.
+        case: What is solved, and for whom.
         warm_start: Folder of the run to begin with.
     """
-    kept = _patient_text(patient)
-    hashes = {"config": sha256(config_text.encode()), "patient_kept": sha256(kept.encode())}
-    if (read := patient_hash(patient)) is not None:
-        hashes["patient"] = read
+    kept = {"config": config_text(case.config), "patient_kept": case.patient_text}
+    hashes = {name: sha256(text.encode()) for name, text in kept.items()}
+    if case.content_hash is not None:
+        hashes["patient"] = case.content_hash
     if warm_start is not None:
         hashes["warm_start"] = sha256((Path(warm_start) / "motion.npz").read_bytes())
-    return RunInputs(hashes, kept, "" if warm_start is None else str(warm_start))
-
-
-def patient_hash(patient: Patient) -> str | None:
-    """Return the SHA-256 of the file that a patient was read from; None if there is none."""
-    return None if patient.source is None else sha256(patient.content)
-
-
-def _patient_text(patient: Patient) -> str:
-    """Return a patient as YAML that `load_patient` reads, the orthosis in its place."""
-    content = patient.model_dump(mode="json", exclude_none=True)
-    return yaml_text(content, "The patient of this run, before any variation of the config.")
+    return RunInputs(hashes, "" if warm_start is None else str(warm_start))
 
 
 def stiffness_ranges(solution: GaitSolution) -> dict[str, tuple[float, float]]:
     """Return the range of every free stiffness [N m/rad]; empty when barefoot."""
     found = {name: solution.bounds.table.find(name) for name in STIFFNESSES}
     return {name: pair for name, pair in found.items() if pair is not None}
+
+
+def unknowns(solution: GaitSolution) -> list[dict[str, Any]]:
+    """Return every number that was free to choose: name, place, value, unit and range."""
+    return [
+        {
+            "name": unknown.name,
+            "place": unknown.address,
+            "value": value,
+            "unit": unknown.unit,
+            "range": solution.bounds.ranges[unknown.name],
+        }
+        for unknown, value in zip(
+            solution.walker.unknowns, solution.last_motion.parameters.tolist(), strict=True
+        )
+    ]
 
 
 def run_metrics(solution: GaitSolution, inputs: RunInputs) -> dict[str, Any]:
@@ -151,6 +149,7 @@ def _proof(solution: GaitSolution, residual: float) -> dict[str, Any]:
         "shortfall": None if solution.shortfall is None else solution.shortfall.as_dict(),
         "active_bounds": [str(bound) for bound in solution.active],
         "stiffness_ranges": stiffness_ranges(solution),
+        "unknowns": unknowns(solution),
         "bound_sources": solution.bounds.sources,
         "notes": solution.walker.patient.notes,
     }

@@ -10,7 +10,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES, SUFFIX, to_degrees
 from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
-from pathwalker_cli.stride.verify import ActiveBound
+from pathwalker_cli.ocp.violations import ActiveBound
 
 __all__ = [
     "bound_line",

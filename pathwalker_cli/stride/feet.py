@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import CONTACT_FORCES, CONTACT_POINTS, SUFFIX, Side
-from pathwalker_cli.model.contact import phase_named
+from pathwalker_cli.model.contact import POINTS, phase_named
 from pathwalker_cli.stride.series import GaitSeries
 
 __all__ = [
@@ -34,7 +34,7 @@ def point_rows(side: Side) -> list[int]:
 def in_contact(series: GaitSeries) -> np.ndarray:
     """Return whether each contact point is on the ground, shape (n, 4)."""
     points = {name: phase_named(name).points for name in set(series.phase)}
-    return np.array([[p in points[name] for p in CONTACT_POINTS] for name in series.phase])
+    return np.array([[p in points[name] for p in POINTS] for name in series.phase])
 
 
 def stance(series: GaitSeries, side: Side) -> np.ndarray:

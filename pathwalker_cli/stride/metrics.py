@@ -10,7 +10,6 @@ import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, ROOT, SUFFIX, Side
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS
 from pathwalker_cli.stride.ankle_profile import ankle_torque_slope
 from pathwalker_cli.stride.cycle import (
     BOTH_SIDES,
@@ -193,8 +192,9 @@ def _loads(series: GaitSeries) -> dict[str, Any]:
 def _energetics(series: GaitSeries) -> dict[str, Any]:
     """Return the metrics of activation and work."""
     effort = float(series.quadrature @ (series.activation**2).sum(axis=1))
-    muscle = _work(series, series.muscle_torque, GENERATOR_ROWS)
-    orthosis = _work(series, series.orthosis_torque, ANKLES)
+    walker = series.walker
+    muscle = _work(series, walker.columns(walker.muscles))
+    orthosis = _work(series, walker.columns(walker.device.forces))
     peaks = series.activation.max(axis=0).tolist()
     return {
         "peak_activation": dict(zip(GENERATORS, peaks, strict=True)),
@@ -260,18 +260,9 @@ def _peak_moments(series: GaitSeries) -> dict[str, float]:
     }
 
 
-def _work(
-    series: GaitSeries, torque: np.ndarray, coordinates: tuple[int, ...]
-) -> tuple[float, float]:
-    """Return positive and negative work of actuators over the stride [J].
-
-    Args:
-        series: The stride.
-        torque: Torques [N m], shape (n, m).
-        coordinates: Position of the coordinate that each of the m actuators drives.
-    """
-    power = torque * series.v[:, list(coordinates)]
-    weights = series.quadrature
+def _work(series: GaitSeries, columns: list[int]) -> tuple[float, float]:
+    """Return positive and negative work of some force elements over the stride [J]."""
+    power, weights = series.element_power[:, columns], series.quadrature
     positive, negative = np.maximum(power, 0.0), np.minimum(power, 0.0)
     return float(weights @ positive.sum(axis=1)), float(weights @ negative.sum(axis=1))
 

@@ -9,10 +9,8 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.resolve import Optimum
-from pathwalker_cli.results.text import active_bounds
-from pathwalker_cli.studies.measures import measure_of
 
-__all__ = ["Ranges", "Spring", "ends", "free_springs", "require_springs", "spring_ranges"]
+__all__ = ["Ranges", "Spring", "end_of", "ends", "free_springs", "require_springs", "spring_ranges"]
 
 Spring = Literal[
     "dorsiflexion_stiffness_right",
@@ -24,6 +22,10 @@ Spring = Literal[
 
 Ranges = Mapping[str, tuple[float, float]]
 """Least and largest stiffness by spring [N m/rad]."""
+
+NEAR_END: Final = 1e-3
+"""Share of its range within which a number sits at a limit: interior-point solvers stay a little
+away from every bound, by far less than this."""
 
 _COLLOCATION: Final = "collocation"
 
@@ -53,9 +55,12 @@ def require_springs(config: StudyConfig, where: str) -> None:
 
 
 def spring_ranges(optimum: Optimum) -> dict[str, tuple[float, float]]:
-    """Return the allowed range of every spring [N m/rad]."""
-    lower, upper = optimum.solver.bounds.table.arrays(STIFFNESSES)
-    return dict(zip(STIFFNESSES, zip(lower.tolist(), upper.tolist(), strict=True), strict=True))
+    """Return the allowed range of every spring [N m/rad]; none where it follows another one."""
+    alone = optimum.solver.bounds.ranges
+    if all(name in alone for name in STIFFNESSES):
+        return {name: alone[name] for name in STIFFNESSES}
+    values = zip(STIFFNESSES, optimum.stiffness.tolist(), strict=True)
+    return {name: alone.get(name, (value, value)) for name, value in values}
 
 
 def free_springs(ranges: Ranges) -> tuple[str, ...]:
@@ -63,14 +68,23 @@ def free_springs(ranges: Ranges) -> tuple[str, ...]:
     return tuple(name for name, (low, high) in ranges.items() if low < high)
 
 
-def ends(values: Mapping[str, float], ranges: Ranges) -> dict[str, Literal["lower", "upper"]]:
+def end_of(value: float, limits: tuple[float, float]) -> Literal["", "lower", "upper"]:
+    """Return the end of its range at which a number sits; "" inside, or where it has no choice."""
+    low, high = limits
+    margin = NEAR_END * (high - low)
+    if low == high:
+        return ""
+    if value >= high - margin:
+        return "upper"
+    return "lower" if value <= low + margin else ""
+
+
+def ends(values: Mapping[str, float], ranges: Ranges) -> dict[str, Literal["", "lower", "upper"]]:
     """Return the free springs that sit at an end of their range, and at which.
 
     Args:
         values: Stiffness by spring [N m/rad]; other keys do no harm.
         ranges: Range by spring.
     """
-    free = {name: ranges[name] for name in free_springs(ranges)}
-    found = {bound.name: bound.end for bound in active_bounds(values, free)}
-    labels = {name: measure_of(name).label for name in free}
-    return {name: found[label] for name, label in labels.items() if label in found}
+    found = {name: end_of(values[name], ranges[name]) for name in ranges if name in values}
+    return {name: end for name, end in found.items() if end}

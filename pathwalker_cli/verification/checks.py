@@ -11,16 +11,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.goal_costs import goal_values
+from pathwalker_cli.gait.cost_terms import cost_terms, goal_values
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.special import refuse_special
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run, repeatable_config
+from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run
 from pathwalker_cli.results.run_metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.stride.balance import balance
@@ -110,17 +108,16 @@ def verify_run(folder: str | Path) -> Verification:
         NotConvergedError: If the run did not converge.
     """
     run = load_run(folder)
-    config = repeatable_config(run)
-    solver = GaitSolver(config)
+    solver = GaitSolver(run.case)
     series = gait_series(solver.walker, run.motion)
     numbers = gait_metrics(series)
     checks = (
         *_files(run, series),
         *_numbers(run, solver, numbers),
-        *_dynamics(run, config, series, numbers),
+        *_dynamics(run, series, numbers),
         *_solution(run, solver),
     )
-    return Verification(Path(folder), config.problem, solver.walker.patient.id, checks)
+    return Verification(Path(folder), run.config.problem, solver.walker.patient.id, checks)
 
 
 def _files(run: Run, series: GaitSeries) -> Iterator[Check]:
@@ -195,7 +192,7 @@ def _numbers(run: Run, solver: GaitSolver, numbers: GaitMetrics) -> Iterator[Che
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
     made: dict[str, Any] = numbers.as_dict()
     if run.config.transcription == "collocation":
-        terms = cost_terms(run.motion, solver.gait, solver.weights, solver.samples)
+        terms = cost_terms(run.motion, solver.gait.costs, solver.weights, solver.samples)
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
         made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)
@@ -240,10 +237,9 @@ def _apart(one: Any, two: Any) -> float:
     return 0.0 if one == two else math.inf
 
 
-def _dynamics(
-    run: Run, config: StudyConfig, series: GaitSeries, numbers: GaitMetrics
-) -> Iterator[Check]:
+def _dynamics(run: Run, series: GaitSeries, numbers: GaitMetrics) -> Iterator[Check]:
     """Yield engines, integrator and conservation laws."""
+    config = run.config
     if config.transcription != "collocation":
         yield Check("dynamics", None, 0.0, "", _SHOOTING)
         return
@@ -284,8 +280,9 @@ def _solution(run: Run, solver: GaitSolver) -> Iterator[Check]:
     motion = replace(run.motion, phases=phases)
     program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)
     unknowns = program.to_unknowns(motion)
-    if unknowns.size != run.multipliers.unknowns.size or (
-        program.program.rows != run.multipliers.rows.size
+    if (program.size, program.rows) != (
+        run.multipliers.unknowns.size,
+        run.multipliers.rows.size,
     ):
         yield Check("optimality", math.inf, 0.0, "", "multipliers of another program")
         return

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from pathwalker_cli.conventions import COORDINATES, SUFFIX, Side, to_degrees
 from pathwalker_cli.errors import InputError
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
+from pathwalker_cli.model.elements.orthosis import OrthosisSide, orthosis_torque
 from pathwalker_cli.stride.ankle_profile import ankle_torque_line
 from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.feet import toe_bearing

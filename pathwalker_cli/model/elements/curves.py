@@ -17,7 +17,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-__all__ = ["BezierChain", "BezierPoint", "evaluate", "newton_steps_for"]
+__all__ = ["BezierChain", "BezierPoint", "SignedCurve", "evaluate", "newton_steps_for"]
 
 _MOST_NEWTON_STEPS = 9
 """Enough for 1e-14 on every corner in use; the flattest are the eccentric velocity curves."""
@@ -108,6 +108,28 @@ def _pieces(chain: BezierChain) -> list[list[Any]]:
 def _table(chain: BezierChain) -> tuple[np.ndarray, np.ndarray]:
     """Return edges, shape (n - 2,), and pieces, shape (8, n - 1), of a chain of numbers."""
     return np.array(chain.x[1:-1]), np.array(_pieces(chain))
+
+
+@dataclass(frozen=True)
+class SignedCurve:
+    """A curve of sign * x.
+
+    Args:
+        chain: The curve.
+        sign: +1 or -1.
+    """
+
+    chain: BezierChain
+    sign: float
+
+    def __call__(self, x: Any) -> Any:
+        """Return the value at x, shaped like x."""
+        return evaluate(self.chain, self.sign * x).value
+
+    def expansion(self, x: Any) -> tuple[Any, Any, Any]:
+        """Return value, first and second derivative at x."""
+        point = evaluate(self.chain, self.sign * x)
+        return point.value, self.sign * point.slope, point.curvature
 
 
 @lru_cache(maxsize=64)
