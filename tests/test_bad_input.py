@@ -21,8 +21,7 @@ from broken import ANGLES, ARCHIVES, EVENTS, HTML, JSON, TABLES, YAML, angles, b
 from conftest import MadeSolution
 from helpers import called_apart
 from made_c3d import write_c3d
-from pathwalker_cli.checking.kinds import KINDS
-from pathwalker_cli.checking.recorded import check_orthosis
+from pathwalker_cli.checking.kinds import KINDS, check_orthosis
 from pathwalker_cli.cli import REFUSED, cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import InputError

@@ -452,7 +452,7 @@ POOL = """
 import os, signal, sys, time
 from pathlib import Path
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.io.processes import called_elsewhere
+from pathwalker_cli.io.processes import results_of_calls
 
 def work(seconds):
     if seconds < 0:
@@ -463,7 +463,7 @@ if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start jobs deaf
     print("begun", flush=True)
     try:
-        list(called_elsewhere(work, [(float(word),) for word in sys.argv[1:]], 2))
+        list(results_of_calls(work, [(float(word),) for word in sys.argv[1:]], 2))
     except KeyboardInterrupt:
         print("stopped", flush=True)
     except NotConvergedError as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -10,7 +9,7 @@ from typing import Any, Final
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, Row
 from pathwalker_cli.evaluation.paper import PaperClaim, PaperNumber
 from pathwalker_cli.evaluation.spread import Spread
-from pathwalker_cli.io.atomic import atomic_open
+from pathwalker_cli.io.csv_file import write_table
 
 __all__ = ["evaluation_content", "write_csv"]
 
@@ -45,11 +44,9 @@ def evaluation_content(
 
 def write_csv(path: str | Path, evaluations: Iterable[Evaluation]) -> None:
     """Write one row per run and quantity; empty cells for what is not known."""
-    with atomic_open(path) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(_COLUMNS)
-        for each in evaluations:
-            writer.writerows(_cells(each.gait.name, row) for row in each.rows)
+    write_table(
+        path, _COLUMNS, (_cells(each.gait.name, row) for each in evaluations for row in each.rows)
+    )
 
 
 def _run(evaluation: Evaluation) -> dict[str, Any]:
@@ -115,10 +112,5 @@ def _cells(run: str, row: Row) -> list[Any]:
     spread = row.recorded
     recorded = (spread.mean, spread.low, spread.high, spread.count) if spread else (None,) * 4
     value = None if row.paper is None else row.paper.value
-    return [run, row.quantity.key, row.quantity.unit, *map(_text, (row.value, *recorded)),
-            row.position or "", _text(value)]  # fmt: skip
-
-
-def _text(value: float | None) -> str:
-    """Return a number as text, "" for none."""
-    return "" if value is None else f"{value:.9g}"
+    key, unit = row.quantity.key, row.quantity.unit
+    return [run, key, unit, row.value, *recorded, row.position or "", value]

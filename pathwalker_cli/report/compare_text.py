@@ -9,8 +9,8 @@ from textwrap import wrap
 from typing import Any, Final
 
 from pathwalker_cli.evaluation.text import number_text, unit_text
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.report.compare import Comparison
-from pathwalker_cli.studies.measures import write_table
 
 __all__ = ["comparison_content", "comparison_lines", "write_comparison_csv"]
 

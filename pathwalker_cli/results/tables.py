@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Final
 
@@ -18,7 +17,7 @@ from pathwalker_cli.conventions import (
     coordinate_unit,
     velocity_unit,
 )
-from pathwalker_cli.io.atomic import atomic_open, atomic_path
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.trajectory_csv import write_trajectory
 from pathwalker_cli.stride.feet import centre_of_pressure
 from pathwalker_cli.stride.series import GaitSeries
@@ -102,26 +101,23 @@ def write_states_csv(path: str | Path, series: GaitSeries) -> None:
     table = states_table(series)
     names = zip(table.names, table.units, strict=True)
     rows = zip(table.time, series.phase, table.values, strict=True)
-    with atomic_open(path) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["time [s]", "phase", *(f"{name} [{unit}]" for name, unit in names)])
-        for time, phase, values in rows:
-            writer.writerow([_text(time), phase, *map(_text, values)])
+    header = ["time [s]", "phase", *(f"{name} [{unit}]" for name, unit in names)]
+    write_table(path, header, ([time, phase, *values] for time, phase, values in rows))
 
 
 def write_controls_csv(path: str | Path, series: GaitSeries) -> None:
     """Write excitations and activation rates."""
-    _write(path, controls_table(series))
+    write_trajectory(path, controls_table(series), DIGITS)
 
 
 def write_forces_csv(path: str | Path, series: GaitSeries) -> None:
     """Write ground reaction forces; no centre of pressure where a foot is not loaded."""
-    _write(path, forces_table(series))
+    write_trajectory(path, forces_table(series), DIGITS)
 
 
 def write_torques_csv(path: str | Path, series: GaitSeries) -> None:
     """Write torques of generators and orthoses and their sum per joint."""
-    _write(path, torques_table(series))
+    write_trajectory(path, torques_table(series), DIGITS)
 
 
 TABLES: Final = {
@@ -137,14 +133,3 @@ def _table(series: GaitSeries, columns: list[Column]) -> Trajectory:
     """Return columns as a trajectory."""
     names, units, values = zip(*columns, strict=True)
     return Trajectory(series.time, names, np.column_stack(values), units)
-
-
-def _write(path: str | Path, table: Trajectory) -> None:
-    """Write a table in one stroke."""
-    with atomic_path(path) as temporary:
-        write_trajectory(temporary, table, DIGITS)
-
-
-def _text(value: float) -> str:
-    """Return a number as text."""
-    return f"{value:.{DIGITS}g}"

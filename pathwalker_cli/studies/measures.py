@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.conventions import STIFFNESSES, to_degrees
 from pathwalker_cli.gait.resolve import Optimum
-from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.stride.metrics import gait_metrics
 
 __all__ = [
@@ -20,7 +17,6 @@ __all__ = [
     "all_measures",
     "measure_of",
     "measures",
-    "write_table",
 ]
 
 
@@ -107,12 +103,3 @@ def measures(optimum: Optimum) -> dict[str, float]:
     """Return the numbers of `MEASURES` that a neighbour has; SI units."""
     found = all_measures(optimum)
     return {m.key: found[m.key] for m in MEASURES if m.key in found}
-
-
-def write_table(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a CSV table; numbers with 9 significant digits, None as an empty cell."""
-    with atomic_open(path) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        for row in rows:
-            writer.writerow([f"{v:.9g}" if isinstance(v, float) else v for v in row])

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import csv
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.csv_file import read_cells, write_table
 from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.table import (
     CONVERGED,
     PENDING,
     CaseTable,
     read_metrics,
-    write_rows,
 )
 from pathwalker_cli.studies.batch.worker import Result
 from pathwalker_cli.studies.run import done_run
@@ -120,9 +120,9 @@ class Ledger:
             self._times[name] = times
 
     def _write(self) -> None:
-        write_rows(self._folder / TABLE, self._table.header, self._rows.values())
+        write_table(self._folder / TABLE, self._table.header, self._rows.values())
         known = [self._times[name] for name in self._cases if name in self._times]
-        write_rows(self._folder / TIMES, _TIMES_HEADER, known)
+        write_table(self._folder / TIMES, _TIMES_HEADER, known)
 
     def _write_detail(self, name: str, detail: str) -> None:
         """Keep what a programmer wants to know of a failure; take away what is over."""
@@ -145,9 +145,8 @@ def _awaited_metrics(folder: Path) -> dict[str, Any] | None:
 def _read_times(path: Path) -> dict[str, tuple[str, ...]]:
     """Return the rows of an earlier table of times by case; none if it cannot be read."""
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.reader(file))[1:]
-    except (OSError, ValueError, csv.Error):
+        rows = read_cells(path)[1:]
+    except DataError:
         return {}
     return {row[0]: tuple(row) for row in rows if len(row) == len(_TIMES_HEADER)}
 

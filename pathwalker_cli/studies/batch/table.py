@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.conventions import SIDES
-from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.results.tables import DIGITS
 from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.units import unit_of
 
-__all__ = ["CONVERGED", "PENDING", "CaseTable", "numbers_of", "read_metrics", "write_rows"]
+__all__ = ["CONVERGED", "PENDING", "CaseTable", "numbers_of", "read_metrics"]
 
 CONVERGED: Final = "converged"
 PENDING: Final = "not yet run"
@@ -96,14 +94,6 @@ def read_metrics(folder: Path) -> dict[str, Any] | None:
     except (OSError, ValueError, RecursionError):
         return None
     return content if isinstance(content, dict) and "status" in content else None
-
-
-def write_rows(path: Path, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Write a table in one stroke."""
-    with atomic_open(path) as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(head)
-        writer.writerows(rows)
 
 
 def _varied(value: Any) -> str:

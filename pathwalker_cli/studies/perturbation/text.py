@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import COMPARED, MEASURES, measure_of, write_table
+from pathwalker_cli.studies.measures import COMPARED, MEASURES, measure_of
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
 from pathwalker_cli.studies.springs import ends
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import MEASURES, Measure, measure_of, write_table
+from pathwalker_cli.studies.measures import MEASURES, Measure, measure_of
 from pathwalker_cli.studies.sensitivity.result import Check, Sensitivities, Sensitivity
 
 __all__ = [

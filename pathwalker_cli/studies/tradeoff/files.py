@@ -8,8 +8,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import MEASURES, write_table
+from pathwalker_cli.studies.measures import MEASURES
 from pathwalker_cli.studies.tradeoff.figures import save_tradeoff_figure
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
