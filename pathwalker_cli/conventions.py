@@ -32,8 +32,8 @@ TRANSLATIONS: Final = COORDINATES[:2]
 ROOT: Final = COORDINATES[:3]
 """Coordinates of the free pelvis: no actuator acts on them."""
 
-SIDES: Final = ("right", "left")
 Side = Literal["right", "left"]
+SIDES: Final[tuple[Side, Side]] = ("right", "left")
 SUFFIX: Final = {"right": "r", "left": "l"}
 """Suffix of a side in coordinate and link names."""
 

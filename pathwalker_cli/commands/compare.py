@@ -35,8 +35,7 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
     from textwrap import fill
 
     from pathwalker_cli.errors import DataError
-    from pathwalker_cli.report.compare import compare_runs
-    from pathwalker_cli.report.compare_text import comparison_content, comparison_lines
+    from pathwalker_cli.report.compare import compare_runs, comparison_content, comparison_lines
 
     if len(runs) < 2:
         raise DataError("is one run", where=str(runs[0]), allowed="two runs or more")
@@ -55,11 +54,11 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
 
 def _write(out: Path, found: Comparison) -> None:
     """Write tables and figures, all or none."""
+    from pathwalker_cli.evaluation.curves import traces
     from pathwalker_cli.evaluation.figures import save_overlays
-    from pathwalker_cli.evaluation.traces import traces
     from pathwalker_cli.inverse.recorded_files import staged_folder
     from pathwalker_cli.io.json_file import write_json
-    from pathwalker_cli.report.compare_text import comparison_content, write_comparison_csv
+    from pathwalker_cli.report.compare import comparison_content, write_comparison_csv
 
     with staged_folder(out) as folder:
         write_json(folder / "compare.json", comparison_content(found))

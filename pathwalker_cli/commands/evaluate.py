@@ -13,7 +13,7 @@ from pathwalker_cli.commands.json_output import json_option, print_json
 
 if TYPE_CHECKING:
     from pathwalker_cli.evaluation.evaluate import Change, Evaluation
-    from pathwalker_cli.evaluation.gait import Gait
+    from pathwalker_cli.stride.stride import Stride
 
 __all__ = ["evaluate_command"]
 
@@ -38,8 +38,8 @@ def evaluate_command(
     other. Recordings are those beside the patient's file. A run that did not converge is refused.
     """
     from pathwalker_cli.evaluation.evaluate import evaluate_gait
-    from pathwalker_cli.evaluation.files import evaluation_content
     from pathwalker_cli.evaluation.run import gaits_of_runs
+    from pathwalker_cli.evaluation.tables import evaluation_content
 
     gaits = gaits_of_runs(runs)
     trials = _trials(gaits, trial)
@@ -54,7 +54,7 @@ def evaluate_command(
         _report(evaluations, changes, out)
 
 
-def _trials(gaits: Sequence[Gait], trial: str | None) -> list[str | None]:
+def _trials(gaits: Sequence[Stride], trial: str | None) -> list[str | None]:
     """Return the trial for each gait: the wanted one where its condition has it.
 
     Raises:
@@ -90,9 +90,9 @@ def _changes(evaluations: Sequence[Evaluation]) -> tuple[Change, ...]:
 
 def _write(out: Path, evaluations: Sequence[Evaluation], content: dict[str, Any]) -> None:
     """Write tables and figures, all or none."""
+    from pathwalker_cli.evaluation.curves import Trace
     from pathwalker_cli.evaluation.figures import save_evaluation_figures
-    from pathwalker_cli.evaluation.files import write_csv
-    from pathwalker_cli.evaluation.traces import lone_trace
+    from pathwalker_cli.evaluation.tables import write_csv
     from pathwalker_cli.inverse.recorded_files import staged_folder
     from pathwalker_cli.io.json_file import write_json
 
@@ -102,7 +102,7 @@ def _write(out: Path, evaluations: Sequence[Evaluation], content: dict[str, Any]
         for each in evaluations:
             figures = folder / "figures"
             save_evaluation_figures(
-                lone_trace(each.gait, each.recorded),
+                Trace(each.gait, each.gait.problem, each.recorded),
                 figures / each.gait.name if len(evaluations) > 1 else figures,
             )
 
@@ -111,7 +111,7 @@ def _report(evaluations: Sequence[Evaluation], changes: Sequence[Change], out: P
     """Print the tables and what to know about them."""
     from textwrap import fill
 
-    from pathwalker_cli.evaluation.text import change_lines, evaluation_lines, evaluation_notes
+    from pathwalker_cli.evaluation.tables import change_lines, evaluation_lines, evaluation_notes
 
     for each in evaluations:
         click.echo("\n".join(evaluation_lines(each)) + "\n")

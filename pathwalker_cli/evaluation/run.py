@@ -7,20 +7,16 @@ from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
-import numpy as np
-
 from pathwalker_cli.config import study_patient
 from pathwalker_cli.errors import DataError, NotConvergedError
-from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.results.run_folder import Run, load_run
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.stride import Stride, stride_of
 
 __all__ = [
     "gait_of_run",
-    "gait_of_series",
     "gaits_of_runs",
     "run_names",
     "run_notes",
@@ -28,7 +24,7 @@ __all__ = [
 ]
 
 
-def gaits_of_runs(folders: Sequence[Path]) -> tuple[Gait, ...]:
+def gaits_of_runs(folders: Sequence[Path]) -> tuple[Stride, ...]:
     """Return the gaits of several runs under names that differ.
 
     Raises:
@@ -57,7 +53,7 @@ def run_names(folders: Sequence[Path]) -> tuple[str, ...]:
 
 
 def stride_of_run(folder: str | Path) -> tuple[Run, GaitSeries]:
-    """Return a converged run and its stride.
+    """Return a converged run and its time series.
 
     Args:
         folder: The folder that `pathwalker solve` wrote.
@@ -90,7 +86,7 @@ def run_notes(run: Run) -> tuple[str, ...]:
     return ("a quick check on a coarse mesh: for orientation only",) if run.config.smoke else ()
 
 
-def gait_of_run(folder: str | Path) -> Gait:
+def gait_of_run(folder: str | Path) -> Stride:
     """Return the gait of a converged run.
 
     Args:
@@ -101,46 +97,4 @@ def gait_of_run(folder: str | Path) -> Gait:
         PatientError: If the patient is no longer there.
     """
     run, series = stride_of_run(folder)
-    name = Path(folder).resolve().name
-    return gait_of_series(series, name, run.config.problem, run.metrics["effort"], run_notes(run))
-
-
-def gait_of_series(
-    series: GaitSeries,
-    name: str,
-    problem: str,
-    effort: float | None = None,
-    notes: tuple[str, ...] = (),
-) -> Gait:
-    """Return a stride of the solver as a plain gait.
-
-    Args:
-        series: The stride.
-        name: What to call it.
-        problem: The problem that it solves.
-        effort: Integral of the sum of squared activations [s].
-        notes: What to know about it.
-
-    Raises:
-        ValueError: If it is no stride in the eight phases.
-    """
-    force = {
-        side: np.stack([series.forward_force(side), series.vertical_force(side)], axis=1)
-        for side in BOTH_SIDES
-    }
-    return Gait(
-        name=name,
-        problem=problem,
-        walker=series.walker,
-        time=series.time,
-        phase=series.phase,
-        phase_durations=series.motion.durations,
-        q=series.q,
-        force=force,
-        net_torque=series.net_torque,
-        muscle_torque=series.muscle_torque,
-        activation=series.activation,
-        effort=effort,
-        stiffness=series.stiffness if series.stiffness.size else None,
-        notes=notes,
-    )
+    return stride_of(series, Path(folder).resolve().name, run.config.problem, run_notes(run))

@@ -66,7 +66,7 @@ def published_forces(recording: Recording) -> PublishedForces:
     for side, index in picked.items():
         force[side] = plane.project(loads[index].force)
         centre[side] = plane.project(wrench_axis_at_ground(loads[index]))[:, 0]
-    return PublishedForces(force, centre, picked)  # type: ignore[arg-type]
+    return PublishedForces(force, centre, picked)
 
 
 def _frame_means(channels: np.ndarray, per_frame: int) -> np.ndarray:

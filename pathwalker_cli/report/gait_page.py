@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
 from pathwalker_cli.evaluation.evaluate import Change
-from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.report.assumptions import assumption_section
 from pathwalker_cli.report.content import Fact, Page
 from pathwalker_cli.report.figures import curve_section
@@ -15,7 +14,7 @@ from pathwalker_cli.report.gait_table import gait_section
 from pathwalker_cli.report.runs import ReportRun, changes_of
 from pathwalker_cli.report.springs import prescribed, recommended, spring_section
 from pathwalker_cli.report.study_tables import study_section
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.verdict_text import snapped_warning
 
 __all__ = ["gait_page"]
@@ -64,7 +63,7 @@ def _of_runs(runs: Sequence[ReportRun]) -> list[Fact]:
 def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
     """Return what a run says in one sentence."""
     row = run.evaluation.row
-    speed = number_text(row("walking_speed").value, row("walking_speed").quantity)
+    speed = row("walking_speed").measure.text(row("walking_speed").value)
     knees = " and ".join(
         f"{to_degrees(row(f'min_stance_knee_flexion_{side}').value or 0.0):.1f} deg {side}"
         for side in SIDES
@@ -72,10 +71,10 @@ def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
     gait = f"at {speed} m/s with a least stance knee flexion of {knees}"
     if not run.worn:
         return f"Predicted {run.label} gait walks {gait}."
-    effort = next((c for c in changes if c.quantity.key == "effort_per_distance"), None)
+    effort = next((c for c in changes if c.measure.key == "effort_per_distance"), None)
     saved = ""
     if effort is not None:
-        values = [number_text(v, effort.quantity) for v in (effort.barefoot, effort.orthosis)]
+        values = [effort.measure.text(v) for v in (effort.barefoot, effort.orthosis)]
         share = 100.0 * effort.value / effort.barefoot
         saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot ({share:+.0f} %)"
     real = run.verdict is not None and run.verdict.snapped is not None

@@ -3,38 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
 from pathwalker_cli.evaluation.evaluate import Change
-from pathwalker_cli.evaluation.evaluate import Row as QuantityRow
-from pathwalker_cli.evaluation.quantities import Quantity, quantity_of
-from pathwalker_cli.evaluation.text import number_text, spread_text, unit_text
+from pathwalker_cli.evaluation.tables import spread_text
 from pathwalker_cli.report.content import Row, Section, Table
 from pathwalker_cli.report.runs import ReportRun
+from pathwalker_cli.stride.measure import Measure
+from pathwalker_cli.stride.measures import measures_in
 
 __all__ = ["gait_section"]
-
-_BOTH: Final = ("right", "left")
-_SHOWN: Final = (
-    "walking_speed",
-    *(f"step_length_{side}" for side in _BOTH),
-    "cadence",
-    "stride_time",
-    *(f"{stem}_{side}" for stem in ("stance_share", "stance_time") for side in _BOTH),
-    *(f"{stem}_{side}" for stem in ("swing_share", "swing_time") for side in _BOTH),
-    "double_support_share",
-    "double_support_time",
-    *(f"min_stance_knee_flexion_{side}" for side in _BOTH),
-    *(f"peak_vertical_force_{side}" for side in _BOTH),
-    "effort_per_distance",
-)
-"""Quantities in the order of the page."""
-
-_LABELS: Final = {
-    "min_stance_knee_flexion": "least stance knee flexion (crouch)",
-    "peak_vertical_force": "peak vertical force",
-}
-"""Names of quantities that say less without the heading they have elsewhere."""
 
 
 def gait_section(runs: Sequence[ReportRun], changes: Sequence[Change]) -> Section:
@@ -51,7 +28,7 @@ def gait_section(runs: Sequence[ReportRun], changes: Sequence[Change]) -> Sectio
     if changes:
         head += ["change", "[%]", "recorded change"]
         columns += "nnn"
-    rows = [_row(quantity_of(key), runs, changes) for key in _SHOWN]
+    rows = [_row(measure, runs, changes) for measure in measures_in("report")]
     notes = ["BW: body weight with what is worn; is: below, in or above the recorded range"]
     notes += [note for run in runs for note in run.evaluation.notes]
     found = tuple(row for row in rows if row is not None)
@@ -63,33 +40,23 @@ def _compared(run: ReportRun) -> bool:
     return run.evaluation.recorded is not None
 
 
-def _row(quantity: Quantity, runs: Sequence[ReportRun], changes: Sequence[Change]) -> Row | None:
-    """Return the row of a quantity, None if no run tells it."""
-    found = [_found(run, quantity) for run in runs]
+def _row(measure: Measure, runs: Sequence[ReportRun], changes: Sequence[Change]) -> Row | None:
+    """Return the row of a measure, None if no run tells it."""
+    found = [
+        next((row for row in run.evaluation.rows if row.measure.key == measure.key), None)
+        for run in runs
+    ]
     if not any(found):
         return None
-    cells = [_label(quantity), unit_text(quantity)]
+    cells = [measure.label.replace("flexion", "flexion (crouch)"), measure.shown_unit]
     for run, row in zip(runs, found, strict=True):
-        cells.append(number_text(row.value if row else None, quantity))
+        cells.append(measure.text(row.value if row else None))
         if _compared(run):
-            cells.append(spread_text(row.recorded if row else None, quantity))
+            cells.append(spread_text(row.recorded if row else None, measure))
             cells.append((row.position or "") if row else "")
     if changes:
-        cells += _change(next((c for c in changes if c.quantity.key == quantity.key), None))
+        cells += _change(next((c for c in changes if c.measure.key == measure.key), None))
     return Row(tuple(cells))
-
-
-def _found(run: ReportRun, quantity: Quantity) -> QuantityRow | None:
-    try:
-        return run.evaluation.row(quantity.key)
-    except KeyError:
-        return None
-
-
-def _label(quantity: Quantity) -> str:
-    """Return what a quantity is called without its heading."""
-    stem, _, side = quantity.key.rpartition("_")
-    return f"{_LABELS[stem]}, {side}" if stem in _LABELS else quantity.label
 
 
 def _change(change: Change | None) -> tuple[str, str, str]:
@@ -97,6 +64,7 @@ def _change(change: Change | None) -> tuple[str, str, str]:
     if change is None:
         return "-", "-", "-"
     share = f"{100.0 * change.value / change.barefoot:+.0f}" if change.barefoot else "-"
-    quantity = change.quantity
-    return (number_text(change.value, quantity, sign=True), share,
-            number_text(change.recorded, quantity, sign=True))  # fmt: skip
+    measure = change.measure
+    return (
+        measure.text(change.value, sign=True), share, measure.text(change.recorded, sign=True)
+    )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import Final
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.report.content import Fact, Row, Section, Table
 from pathwalker_cli.report.runs import ReportRun
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, Verdict
 from pathwalker_cli.studies.verdict_text import (
     PRESCRIBED,

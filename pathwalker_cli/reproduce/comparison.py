@@ -8,18 +8,15 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, to_degrees
-from pathwalker_cli.evaluation.angle_rms import JOINTS
-from pathwalker_cli.evaluation.numbers import recorded_numbers
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX, to_degrees
+from pathwalker_cli.evaluation.differences import JOINTS
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperNumber
-from pathwalker_cli.evaluation.recorded import RecordedGait
-from pathwalker_cli.evaluation.spread import Spread
+from pathwalker_cli.evaluation.recorded import RecordedGait, Spread, recorded_numbers
 from pathwalker_cli.inverse.bands import cycle_band
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce.inverse_study import InverseResult
 from pathwalker_cli.reproduce.reasons import NOT_COMPUTED, reason_for
 from pathwalker_cli.reproduce.results import ProblemResult, Results
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 
 __all__ = ["Ours", "Row", "all_rows", "number_rows"]
 
@@ -133,7 +130,7 @@ def _peak_forces(results: Results) -> float | None:
     peaks = [
         float(curve[:, 1].max())
         for gait in results.recorded.values()
-        for side in BOTH_SIDES
+        for side in SIDES
         for curve in gait.stance_forces(side)
     ]
     return float(np.mean(peaks)) if peaks else None
@@ -141,7 +138,7 @@ def _peak_forces(results: Results) -> float | None:
 
 def _change(number: PaperNumber, results: Results) -> Ours | str:
     """Return a change from barefoot to orthosis."""
-    found = next((c for c in results.changes if c.quantity.key == number.quantity), None)
+    found = next((c for c in results.changes if c.measure.key == number.quantity), None)
     if found is None:
         return "not computed: mapd-barefoot and mapd-orthosis did not both converge"
     return Ours(found.value)
@@ -155,7 +152,7 @@ def _gait(number: PaperNumber, result: ProblemResult) -> Ours | str:
         return Ours(float(result.metrics["seconds_solve"]))
     if number.quantity == "walking_speed_weight":
         return Ours(float(result.config.cost.walking_speed_weight))
-    rows = {row.quantity.key: row.value for row in result.evaluation.rows}
+    rows = {row.measure.key: row.value for row in result.evaluation.rows}
     value = rows.get(number.quantity)
     return "not computed: the run does not tell" if value is None else Ours(value)
 
@@ -178,7 +175,7 @@ def _recorded(
 def _largest_deviation(recorded: RecordedGait) -> Ours:
     """Return the largest standard deviation over the cycle of the least and greatest joint."""
     largest: dict[str, list[float]] = {}
-    for side in BOTH_SIDES:
+    for side in SIDES:
         band = cycle_band([(trial.motion, trial.cycles) for trial in recorded.trials], side)
         for joint in _JOINTS:
             names = [n for n in JOINTS[joint] if len(JOINTS[joint]) == 1 or n[-1] == SUFFIX[side]]
@@ -201,7 +198,7 @@ def _over_cycle(number: PaperNumber, results: Results) -> str:
         return ""
     key = number.quantity.replace("one_trial", "mean_cycle")
     found = (
-        [row.value for row in result.evaluation.rows if row.quantity.key == key]
+        [row.value for row in result.evaluation.rows if row.measure.key == key]
         if result.evaluation
         else []
     )

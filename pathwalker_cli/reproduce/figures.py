@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,8 +11,8 @@ from typing import Final
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from pathwalker_cli.evaluation.figures import ankle_figure, ground_force_figure, joint_angle_figure
-from pathwalker_cli.evaluation.traces import Trace, lone_trace
+from pathwalker_cli.evaluation.curves import ANGLES, FORCES, CycleCurve, Trace
+from pathwalker_cli.evaluation.figures import ankle_figure, cycle_figure
 from pathwalker_cli.reproduce.muscle_figures import (
     activation_figure,
     curve_figure,
@@ -78,8 +78,8 @@ def _plans(results: Results) -> Iterator[_Plan]:
     )
     if "mapd-orthosis" in solved:
         yield _orthosis(solved["mapd-orthosis"])
-    yield from _kinds(solved, "figure-3", "joint angles", joint_angle_figure)
-    yield from _kinds(solved, "figure-4", "ground reaction forces", ground_force_figure)
+    yield from _kinds(solved, "figure-3", "joint angles", ANGLES)
+    yield from _kinds(solved, "figure-4", "ground reaction forces", FORCES)
     if {"mapd-barefoot", "mapd-orthosis"} <= solved.keys():
         gaits = tuple(_series(solved[name]) for name in ("mapd-barefoot", "mapd-orthosis"))
         yield _Plan(
@@ -111,7 +111,7 @@ def _orthosis(result: ProblemResult) -> _Plan:
 
 
 def _kinds(
-    solved: Mapping[str, ProblemResult], name: str, what: str, make: Callable[[Trace], Figure]
+    solved: Mapping[str, ProblemResult], name: str, what: str, curves: Sequence[CycleCurve]
 ) -> Iterator[_Plan]:
     """Yield one figure per problem of what the article shows in one figure."""
     number = name.replace("figure-", "Figure ")
@@ -121,7 +121,7 @@ def _kinds(
             beyond = " (not in the article's main text)" if problem in _BEYOND else ""
             band = "" if trace.recorded is None else ", over the recorded range"
             caption = f"{number}, {_NAMES[problem]}{beyond}: {what}{band}."
-            yield _Plan(f"{name}-{problem}", caption, partial(make, trace))
+            yield _Plan(f"{name}-{problem}", caption, partial(cycle_figure, trace, curves))
 
 
 def _series(result: ProblemResult) -> GaitSeries:
@@ -135,4 +135,5 @@ def _trace(result: ProblemResult) -> Trace:
     """Return the gait of a converged problem over the recordings."""
     if result.evaluation is None:
         raise ValueError(f"{result.problem} did not converge")
-    return lone_trace(result.evaluation.gait, result.evaluation.recorded)
+    gait = result.evaluation.gait
+    return Trace(gait, gait.problem, result.evaluation.recorded)

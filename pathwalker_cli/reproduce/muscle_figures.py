@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SUFFIX, Side, to_degrees
+from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side, to_degrees
 from pathwalker_cli.model.muscle import generators
-from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
 from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION
 from pathwalker_cli.stride.figures.style import (
     NEUTRAL,
@@ -23,6 +22,7 @@ from pathwalker_cli.stride.figures.style import (
     zero_line,
 )
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import own_cycle
 
 __all__ = ["activation_figure", "curve_figure", "muscle_torque_figure"]
 
@@ -78,7 +78,7 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
     """
     fig = new_figure(4.2)
     grid = fig.subplots(3, 2, sharex=True, sharey="row")
-    for column, side in enumerate(BOTH_SIDES):
+    for column, side in enumerate(SIDES):
         for ax, joint in zip(grid[:, column], LEG_JOINTS, strict=True):
             dress(ax, f"{side.capitalize()} {joint}", y="" if column else _TORQUE)
             zero_line(ax)
@@ -88,7 +88,7 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
                     torque = series.muscle_torque[:, GENERATORS.index(name)]
                     _draw(ax, series, side, EXTENSION[joint] * torque, look)
             if joint == "ankle":
-                own = orthosis.orthosis_torque[:, BOTH_SIDES.index(side)]
+                own = orthosis.orthosis_torque[:, SIDES.index(side)]
                 _draw(ax, orthosis, side, own, {"color": NEUTRAL, "linewidth": 0.7})
             percent_axis(ax, *([] if joint == LEG_JOINTS[-1] else [""]))
     thin = Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis")
@@ -105,7 +105,7 @@ def activation_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
     """
     fig = new_figure(3.8)
     grid = fig.subplots(3, 4, sharex=True, sharey=True)
-    columns = [(side, direction) for side in BOTH_SIDES for direction in _DIRECTIONS]
+    columns = [(side, direction) for side in SIDES for direction in _DIRECTIONS]
     for row, joint in zip(grid, LEG_JOINTS, strict=True):
         for ax, (side, direction) in zip(row, columns, strict=True):
             name = f"{joint}_{direction}_{SUFFIX[side]}"

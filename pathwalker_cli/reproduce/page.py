@@ -8,7 +8,6 @@ from typing import Final
 
 from pathwalker_cli.evaluation.evaluate import Change
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperClaim, PaperNumber
-from pathwalker_cli.evaluation.quantities import quantity_of
 from pathwalker_cli.reproduce.comparison import Row, all_rows
 from pathwalker_cli.reproduce.inverse_study import METHODS
 from pathwalker_cli.reproduce.problem_tables import optima_lines, problem_lines
@@ -165,13 +164,13 @@ def _change_lines(changes: Sequence[Change]) -> Iterator[str]:
     for change in changes:
         if change.paper is None:
             continue
-        quantity = quantity_of(change.quantity.key)
+        measure = change.measure
         rises = _rises(change.paper)
         moved = abs(change.value) > _UNCHANGED * abs(change.barefoot)
         same = ("yes" if (change.value > 0.0) == rises else "no") if moved else "no, unchanged"
         cells.append(
             (
-                f"{quantity.section.lower()}: {quantity.label} [{quantity.unit}]",
+                f"{measure.section.lower()}: {measure.row} [{measure.unit}]",
                 "rises" if rises else "falls",
                 plain(change.barefoot, ".3f"),
                 plain(change.orthosis, ".3f"),

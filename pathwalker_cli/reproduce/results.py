@@ -12,12 +12,12 @@ from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.paper import PATIENT
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
-from pathwalker_cli.evaluation.run import gait_of_series
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce.inverse_study import InverseResult
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.stride import stride_of
 
 __all__ = ["ProblemResult", "Results", "evaluated", "recordings"]
 
@@ -107,7 +107,7 @@ def evaluated(
     patient = study_patient(config)
     walker = build_walker(patient, config.condition, config.model.published)
     series = gait_series(walker, run.motion)
-    gait = gait_of_series(series, config.problem, config.problem, metrics["effort"])
+    gait = stride_of(series, config.problem, config.problem)
     theirs = recorded.get(config.condition) if patient.id == PATIENT else None
     evaluation = evaluate_gait(gait, recorded=theirs)
     return ProblemResult(config.problem, metrics, config, kept, series, evaluation)

@@ -24,7 +24,7 @@ def orthosis_rows(orthosis: OrthosisData) -> list[tuple[str, str]]:
     """Return label and text of what is worn on each leg and which springs there are."""
     mass = orthosis.mass
     play = float(to_degrees(orthosis.free_play))
-    stops = {
+    stops: dict[str, str] = {
         side: f"{angle_words(orthosis.dorsiflexion_stop[side])} to "
         f"{angle_words(orthosis.plantarflexion_stop[side])}"
         for side in SIDES

@@ -20,7 +20,8 @@ from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.nlp.kernels import kernels_level
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.stride.balance import balance
-from pathwalker_cli.stride.metrics import gait_metrics
+from pathwalker_cli.stride.measures import metrics_of
+from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.versions import today, versions
 
 __all__ = [
@@ -107,7 +108,7 @@ def run_metrics(solution: GaitSolution, inputs: RunInputs) -> dict[str, Any]:
     metrics = {
         "run_format": RUN_FORMAT,
         **_outcome(solution),
-        **gait_metrics(solution.last_iterate).as_dict(),
+        **metrics_of(stride_of(solution.last_iterate)),
         **_proof(solution, residual),
         **_effort(solution),
         "seconds_verify": verify,

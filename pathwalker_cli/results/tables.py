@@ -20,8 +20,8 @@ from pathwalker_cli.conventions import (
 )
 from pathwalker_cli.io.atomic import atomic_open, atomic_path
 from pathwalker_cli.io.trajectory_csv import write_trajectory
-from pathwalker_cli.stride.feet import centre_of_pressure
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import centre_of_pressure
 from pathwalker_cli.trajectory import Trajectory
 
 __all__ = [

@@ -10,7 +10,7 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.results.text import active_bounds
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.stride.measures import measure_of
 
 __all__ = ["Ranges", "Spring", "ends", "free_springs", "require_springs", "spring_ranges"]
 

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import STIFFNESSES, to_degrees
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, StopVerdict, Verdict
 
 __all__ = [

@@ -24,8 +24,9 @@ from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run, re
 from pathwalker_cli.results.run_metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.stride.balance import balance
-from pathwalker_cli.stride.metrics import GaitMetrics, gait_metrics
+from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.stride.verify import equation_residual, reintegrate, second_engine_residual
 
 __all__ = ["Check", "Verification", "verify_run"]
@@ -113,7 +114,7 @@ def verify_run(folder: str | Path) -> Verification:
     config = repeatable_config(run)
     solver = GaitSolver(config)
     series = gait_series(solver.walker, run.motion)
-    numbers = gait_metrics(series)
+    numbers = metrics_of(stride_of(series))
     checks = (
         *_files(run, series),
         *_numbers(run, solver, numbers),
@@ -190,10 +191,10 @@ def _difference(one: str, two: str, scale: float) -> float:
     return difference if math.isfinite(difference) else math.inf
 
 
-def _numbers(run: Run, solver: GaitSolver, numbers: GaitMetrics) -> Iterator[Check]:
+def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[Check]:
     """Yield whether metrics.json says what follows from the motion."""
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
-    made: dict[str, Any] = numbers.as_dict()
+    made = dict(numbers)
     if run.config.transcription == "collocation":
         terms = cost_terms(run.motion, solver.gait, solver.weights, solver.samples)
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
@@ -241,7 +242,7 @@ def _apart(one: Any, two: Any) -> float:
 
 
 def _dynamics(
-    run: Run, config: StudyConfig, series: GaitSeries, numbers: GaitMetrics
+    run: Run, config: StudyConfig, series: GaitSeries, numbers: dict[str, Any]
 ) -> Iterator[Check]:
     """Yield engines, integrator and conservation laws."""
     if config.transcription != "collocation":
@@ -270,7 +271,7 @@ def _dynamics(
     )
     for name, share, limit in shares:
         yield Check(name, share if refined else None, limit, "share", note)
-    pull = max(0.0, -numbers.min_vertical_force)
+    pull = max(0.0, -numbers["min_vertical_force"])
     yield Check("ground pulls", pull, _EQUATIONS, "N")
 
 

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from pathwalker_cli.io.table import write_table
 from pathwalker_cli.studies.batch.cases import Case
 from pathwalker_cli.studies.batch.table import (
     CONVERGED,
     PENDING,
     CaseTable,
     read_metrics,
-    write_rows,
 )
 from pathwalker_cli.studies.batch.worker import Result
 from pathwalker_cli.studies.run import is_done
@@ -120,9 +120,9 @@ class Ledger:
             self._times[name] = times
 
     def _write(self) -> None:
-        write_rows(self._folder / TABLE, self._table.header, self._rows.values())
+        write_table(self._folder / TABLE, self._table.header, self._rows.values())
         known = [self._times[name] for name in self._cases if name in self._times]
-        write_rows(self._folder / TIMES, _TIMES_HEADER, known)
+        write_table(self._folder / TIMES, _TIMES_HEADER, known)
 
     def _write_detail(self, name: str, detail: str) -> None:
         """Keep what a programmer wants to know of a failure; take away what is over."""

@@ -8,7 +8,9 @@ from typing import Any, Final
 
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import COMPARED, MEASURES, measure_of, write_table
+from pathwalker_cli.io.table import write_table
+from pathwalker_cli.stride.measures import measure_of, measures_in
+from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
 from pathwalker_cli.studies.springs import ends
 
@@ -48,7 +50,7 @@ def paper_changes(result: Perturbation, row: Perturbed) -> dict[str, float]:
 
 def write_perturbation(result: Perturbation, folder: Path) -> None:
     """Write `perturbation.csv` and `perturbation.json`."""
-    keys = [m.key for m in MEASURES if m.key in result.base]
+    keys = [m.key for m in measures_in("studies") if m.key in result.base]
     header = ["spring", "factor [1]", "stiffness [N m/rad]", "status"]
     header += [measure_of(key).column for key in keys]
     header += [f"change of {key} [%]" for key in keys]
