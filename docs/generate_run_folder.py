@@ -130,6 +130,7 @@ PROOF: Final = {
     "shortfall": "of a run that found no motion: whether muscles of any strength walk within the bounds, and the "
     "torques [N m] that the muscles lack, with strength and percent of the stride; otherwise null",
     "active_bounds": "names of the bounds that hold the solution back, with value and phases",
+    "active": "the same bounds typed: `name`, `side` (`lower` or `upper`), `value`, `places` (phases)",
     "stiffness_ranges": "by stiffness, allowed range [N m/rad]",
     "bound_sources": "by quantity, its bounds and where they come from",
     "notes": "what was filled in or overridden in the patient's file",

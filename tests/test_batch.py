@@ -30,8 +30,8 @@ from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.metrics import run_inputs
 from pathwalker_cli.results.run_folder import config_text, write_run
-from pathwalker_cli.results.run_metrics import run_inputs
 from pathwalker_cli.studies.batch import ledger, local
 from pathwalker_cli.studies.batch.cases import Case, load_cases
 from pathwalker_cli.studies.batch.local import LocalPool

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from figure_measure import complaints
 from helpers import ACTIVATION, FRICTION, GAIT, STIFFNESS, stylised_series
-from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, SIDES
+from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, SIDES, STIFFNESSES
 from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.io.atomic import atomic_open, atomic_path
 from pathwalker_cli.io.json_file import json_text, write_json
@@ -24,7 +24,7 @@ from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.model.walker import ANKLES
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.results.tables import TABLES, controls_table, forces_table, torques_table
-from pathwalker_cli.results.text import active_bounds, summary, summary_renderable
+from pathwalker_cli.results.text import spring_notes, summary, summary_renderable
 from pathwalker_cli.stride.figures import (
     FIGURES,
     Band,
@@ -37,7 +37,7 @@ from pathwalker_cli.stride.measures import ankle_torque_line, metrics_of
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import centre_of_pressure, own_cycle, stride_of
 
-RANGES = {"dorsiflexion_stiffness": (5.0, 92.0), "plantarflexion_stiffness": (10.0, 92.0)}
+RANGES = {name: (5.0 if name.startswith("d") else 10.0, 92.0) for name in STIFFNESSES}
 
 
 @pytest.fixture(scope="module")
@@ -320,18 +320,17 @@ def test_barefoot_has_no_orthosis_curve() -> None:
 
 def test_active_bounds_in_words(metrics: dict[str, Any]) -> None:
     flat = metrics | {"dorsiflexion_stiffness_right": 91.9998}
-    bounds = active_bounds(flat, RANGES)
-    assert [str(bound) for bound in bounds] == [
+    assert spring_notes(flat, RANGES) == [
         "K_D right sits at its upper limit of 92 N m/rad: a stiffer one would cost less",
         "K_P right sits at its lower limit of 10 N m/rad: a softer one would cost less",
     ]
-    assert active_bounds(metrics_of(stride_of(stylised_series("barefoot"))), RANGES) == ()
+    assert spring_notes(metrics_of(stride_of(stylised_series("barefoot"))), RANGES) == []
 
 
 def test_summary(metrics: dict[str, Any]) -> None:
     flat = metrics
-    bounds = active_bounds(flat, RANGES)
-    text = summary(flat, "converged", 1.23456789, bounds)
+    notes = spring_notes(flat, RANGES)
+    text = summary(flat, "converged", 1.23456789, notes)
     for part in (
         "converged",
         "1.2346",
@@ -342,7 +341,7 @@ def test_summary(metrics: dict[str, Any]) -> None:
         assert part in text
     assert text.splitlines()[-1].startswith("note: K_P right sits at its lower limit")
     console = Console(file=StringIO(), width=120)
-    console.print(summary_renderable(flat, "converged", 1.23456789, bounds))
+    console.print(summary_renderable(flat, "converged", 1.23456789, notes))
     shown = console.file.getvalue()  # type: ignore[attr-defined]
     assert "\x1b" not in shown
     assert [line.split() for line in shown.splitlines()] == [

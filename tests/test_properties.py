@@ -71,11 +71,10 @@ from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.blocks import OrthosisData
+from pathwalker_cli.results.metrics import run_inputs
 from pathwalker_cli.results.motion_file import read_motion, write_motion
-from pathwalker_cli.results.orthosis_text import angle_words
 from pathwalker_cli.results.run_folder import config_text
-from pathwalker_cli.results.run_metrics import run_inputs
-from pathwalker_cli.results.text import summary_rows
+from pathwalker_cli.results.text import angle_words, summary_rows
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import gait_series
 from pathwalker_cli.stride.stride import own_cycle, stride_of

@@ -16,7 +16,7 @@ from pathwalker_cli.report.folders import STUDIES, Kind, studies_near
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.results import run_folder
-from pathwalker_cli.results.metrics_model import RunMetrics
+from pathwalker_cli.results.metrics import RunMetrics
 from pathwalker_cli.studies.verdict import verdict_of_metrics
 from pathwalker_cli.studies.verdict_text import verdict_lines
 from report_runs import write_made_run
@@ -98,7 +98,7 @@ def test_any_value_in_the_metrics_of_a_run(run: Path, tmp_path: Path) -> None:
     before = file.read_text(encoding="utf-8")
 
     def read() -> None:
-        verdict = verdict_of_metrics(run_folder._read_metrics(run))
+        verdict = verdict_of_metrics(run_folder._read_metrics(run)[0])
         if verdict is not None:
             list(verdict_lines(verdict))
 

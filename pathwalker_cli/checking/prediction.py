@@ -22,9 +22,8 @@ from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import Strengths
-from pathwalker_cli.results.orthosis_text import orthosis_rows
 from pathwalker_cli.results.run_folder import ENTRIES, check_target, default_folder
-from pathwalker_cli.results.solve_text import notes_together
+from pathwalker_cli.results.text import notes_together, orthosis_rows
 from pathwalker_cli.studies.batch.checks import check_patient
 
 __all__ = [

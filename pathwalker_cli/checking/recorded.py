@@ -27,7 +27,7 @@ from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.yaml_file import load_yaml
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient
-from pathwalker_cli.results.orthosis_text import orthosis_rows
+from pathwalker_cli.results.text import orthosis_rows
 
 __all__ = [
     "check_dynamics",

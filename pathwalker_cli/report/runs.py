@@ -14,8 +14,8 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.run import gait_of_run
 from pathwalker_cli.patient import Patient, load_patient
+from pathwalker_cli.results.metrics import patient_hash
 from pathwalker_cli.results.run_folder import PATIENT, Run, load_run
-from pathwalker_cli.results.run_metrics import patient_hash
 from pathwalker_cli.studies.verdict import Verdict, verdict_of_metrics
 
 __all__ = ["ReportRun", "changes_of", "read_runs"]

@@ -212,8 +212,7 @@ def _resting(number: PaperNumber, results: Results) -> str:
     result = results.problems.get(number.subject)
     if result is None or not result.converged:
         return ""
-    for bound in result.metrics["active_bounds"]:
-        name, side, value, *_ = f"{bound} ".split(" ")
-        if name == number.quantity and side in ("lower", "upper"):
-            return f"ours rests on its {side} bound, {value} {number.unit}"
+    for bound in result.bounds:
+        if bound.name == number.quantity:
+            return f"ours rests on its {bound.side} bound, {bound.value:.4g} {number.unit}"
     return ""

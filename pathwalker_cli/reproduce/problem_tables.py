@@ -44,7 +44,6 @@ _SOLVE: Final[dict[str, Callable[[Metrics], str]]] = {
     "re-integration error [rad/s or m/s]": _pair(".1e", "reintegration_velocity_error"),
 }
 _GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
-    "active bounds that shape the gait": lambda m: str(len(shaping_bounds(m))),
     "walking speed [m/s]": _pair(".3f", "walking_speed"),
     "step length left, right [m]": _sides("step_length", ".3f"),
     "least knee flexion of stance left, right [deg]": _knees,
@@ -58,9 +57,9 @@ _GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
 """Rows of the table: what a solve says, and what its gait says if it converged."""
 
 
-def shaping_bounds(metrics: Metrics) -> list[str]:
+def shaping_bounds(result: ProblemResult) -> list[str]:
     """Return the active bounds that are choices which shape the gait."""
-    return [bound for bound in metrics["active_bounds"] if bound.split(" ")[0] in _SHAPING]
+    return [str(bound) for bound in result.bounds if bound.name in _SHAPING]
 
 
 def problem_lines(results: Results) -> Iterator[str]:
@@ -69,6 +68,8 @@ def problem_lines(results: Results) -> Iterator[str]:
     rows = [("this call", *("kept" if each.kept else "solved now" for each in problems.values()))]
     for name, show in _SOLVE.items():
         rows.append((name, *(show(each.metrics) for each in problems.values())))
+    counts = (str(len(shaping_bounds(p))) if p.converged else "-" for p in problems.values())
+    rows.append(("active bounds that shape the gait", *counts))
     for name, show in _GAIT.items():
         shown = (show(each.metrics) if each.converged else "-" for each in problems.values())
         rows.append((name, *(text.replace("-, -", "-") for text in shown)))
@@ -79,7 +80,7 @@ def problem_lines(results: Results) -> Iterator[str]:
     yield "Active bounds that shape the gait:"
     yield ""
     for name, each in problems.items():
-        found = "; ".join(shaping_bounds(each.metrics)) or "none"
+        found = "; ".join(shaping_bounds(each)) or "none"
         yield f"- {name}: {found if each.converged else 'did not converge'}"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from pathwalker_cli.reproduce.inverse_study import InverseResult
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import stride_of
+from pathwalker_cli.stride.verify import ActiveBound
 
 __all__ = ["ProblemResult", "Results", "evaluated", "recordings"]
 
@@ -29,6 +30,7 @@ class ProblemResult:
     Args:
         problem: Its name.
         metrics: Content of `metrics.json`.
+        bounds: Bounds that hold the solution back.
         config: The config that was solved.
         kept: Whether it was solved before and not again.
         series: The stride, None if it did not converge.
@@ -37,6 +39,7 @@ class ProblemResult:
 
     problem: str
     metrics: Mapping[str, Any]
+    bounds: tuple[ActiveBound, ...]
     config: StudyConfig
     kept: bool
     series: GaitSeries | None = None
@@ -101,7 +104,7 @@ def evaluated(
     """
     run = load_run(folder, allow_unconverged=True)
     config, metrics = run.config, run.metrics
-    result = ProblemResult(config.problem, metrics, config, kept)
+    result = ProblemResult(config.problem, metrics, run.result.bounds, config, kept)
     if metrics["status"] != "converged":
         return result
     patient = study_patient(config)
@@ -110,4 +113,4 @@ def evaluated(
     gait = stride_of(series, config.problem, config.problem)
     theirs = recorded.get(config.condition) if patient.id == PATIENT else None
     evaluation = evaluate_gait(gait, recorded=theirs)
-    return ProblemResult(config.problem, metrics, config, kept, series, evaluation)
+    return replace(result, series=series, evaluation=evaluation)

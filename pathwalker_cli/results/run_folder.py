@@ -27,20 +27,22 @@ from pathwalker_cli.io.recordings import write_recording
 from pathwalker_cli.io.yaml_file import validate, yaml_text
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
-from pathwalker_cli.results.metrics_model import RunMetrics
-from pathwalker_cli.results.motion_file import read_motion, write_motion
-from pathwalker_cli.results.multipliers_file import read_multipliers, write_multipliers
-from pathwalker_cli.results.run_metrics import (
-    METRICS_HASH,
+from pathwalker_cli.results.metrics import (
     RUN_FORMAT,
     RunInputs,
-    metrics_hash,
+    RunMetrics,
     run_inputs,
     run_metrics,
     sha256,
 )
-from pathwalker_cli.results.solve_text import shortfall_text
+from pathwalker_cli.results.motion_file import (
+    read_motion,
+    read_multipliers,
+    write_motion,
+    write_multipliers,
+)
 from pathwalker_cli.results.tables import TABLES
+from pathwalker_cli.results.text import shortfall_text
 from pathwalker_cli.stride.figures import save_figures
 from pathwalker_cli.stride.series import GaitSeries
 
@@ -81,7 +83,8 @@ class Run:
 
     Args:
         folder: Where it stands.
-        metrics: Content of `metrics.json`.
+        metrics: Content of `metrics.json`, by key.
+        result: The same, typed.
         motion: The exact motion.
         config: The config with all defaults filled in.
         multipliers: Multipliers of the solution by collocation; None if they were not kept.
@@ -89,6 +92,7 @@ class Run:
 
     folder: Path
     metrics: dict[str, Any]
+    result: RunMetrics
     motion: PhasedMotion
     config: StudyConfig
     multipliers: Multipliers | None = None
@@ -132,24 +136,23 @@ def write_run(
     """
     text = config_text(solution.config)
     inputs = inputs or run_inputs(text, solution.walker.patient)
-    metrics = run_metrics(solution, inputs)
-    metrics |= more or {}
+    result = run_metrics(solution, inputs, more)
     with _staged(Path(folder)) as staging:
         (staging / CONFIG).write_text(text, encoding="utf-8")
         (staging / PATIENT).write_text(inputs.patient, encoding="utf-8")
         _keep_recording(staging, solution)
         (staging / "log.txt").write_text("".join(f"{line}\n" for line in log), encoding="utf-8")
         write_motion(staging / _MOTION, solution.last_motion)
-        metrics["motion_hash"] = sha256((staging / _MOTION).read_bytes())
+        result.motion_hash = sha256((staging / _MOTION).read_bytes())
         if solution.converged and solution.config.transcription == "collocation":
             write_multipliers(staging / _MULTIPLIERS, solution.nlp.multipliers)
-            metrics["multipliers_hash"] = sha256((staging / _MULTIPLIERS).read_bytes())
+            result.multipliers_hash = sha256((staging / _MULTIPLIERS).read_bytes())
         _write_series(staging, solution.last_iterate)
         if not solution.converged:
             (staging / _SEAL).write_text(_seal(solution), encoding="utf-8")
-        metrics[METRICS_HASH] = metrics_hash(metrics)
-        write_json(staging / _METRICS, metrics)
-    return metrics
+        content = result.content()
+        write_json(staging / _METRICS, content)
+    return content
 
 
 def _keep_recording(folder: Path, solution: GaitSolution) -> None:
@@ -291,24 +294,24 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
         NotConvergedError: If the run did not converge.
     """
     folder = Path(folder)
-    metrics = _read_metrics(folder)
-    if (metrics["status"] != "converged" or (folder / _SEAL).exists()) and not allow_unconverged:
+    metrics, result = _read_metrics(folder)
+    if (result.status != "converged" or (folder / _SEAL).exists()) and not allow_unconverged:
         raise NotConvergedError(
-            f"{folder}: {metrics['problem']} did not converge there ({metrics['status']}); "
+            f"{folder}: {result.problem} did not converge there ({result.status}); "
             "its last iterate is no solution"
         )
     motion = read_motion(folder / _MOTION)
-    _check_hash(folder / _MOTION, metrics["motion_hash"])
+    _check_hash(folder / _MOTION, result.motion_hash)
     multipliers = None
     if (folder / _MULTIPLIERS).exists():
         multipliers = read_multipliers(folder / _MULTIPLIERS)
-        _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
+        _check_hash(folder / _MULTIPLIERS, result.multipliers_hash)
     config = load_config(_file(folder, CONFIG))
     expected = len(STIFFNESSES) if config.condition == "orthosis" else 0
-    if config.problem != metrics["problem"] or motion.parameters.size != expected:
+    if config.problem != result.problem or motion.parameters.size != expected:
         where = str(folder / CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)
-    return Run(folder, metrics, motion, config, multipliers)
+    return Run(folder, metrics, result, motion, config, multipliers)
 
 
 def repeatable_config(run: Run) -> StudyConfig:
@@ -337,8 +340,8 @@ def _file(folder: Path, name: str) -> Path:
     return path
 
 
-def _read_metrics(folder: Path) -> dict[str, Any]:
-    """Return the metrics of a run."""
+def _read_metrics(folder: Path) -> tuple[dict[str, Any], RunMetrics]:
+    """Return the metrics of a run, by key and typed."""
     path = _file(folder, _METRICS)
     metrics = read_json(path, mend="solve again")
     if "run_format" not in metrics:
@@ -347,8 +350,7 @@ def _read_metrics(folder: Path) -> dict[str, Any]:
     if metrics["run_format"] != RUN_FORMAT:
         raise DataError(f"has run_format {metrics['run_format']}", where=str(path),
                         allowed=str(RUN_FORMAT), mend="solve again")  # fmt: skip
-    validate(metrics, RunMetrics, where=str(path), error=DataError)
-    return metrics
+    return metrics, validate(metrics, RunMetrics, where=str(path), error=DataError)
 
 
 def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:

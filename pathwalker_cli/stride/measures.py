@@ -32,8 +32,10 @@ from pathwalker_cli.stride.stride import LOADED_SHARE, Stride, contacts, toe_bea
 
 __all__ = [
     "REGISTRY",
+    "TABLES",
     "ankle_line",
     "ankle_torque_line",
+    "expanded",
     "measure_of",
     "measures_in",
     "metrics_of",
@@ -203,11 +205,9 @@ REGISTRY: tuple[Measure, ...] = (
     Measure("double_support_time", "double support time", "s",
             "time of the stride with both feet on the ground", _double_support, section=WALK,
             kept=False),
-    Measure("phase_durations", "phase durations", "s", "per phase",
-            lambda s: s.phase_durations, shown=False),
     *per_side("min_stance_knee_flexion_*", "least stance knee flexion, *", "rad",
-              "least knee flexion of stance: the crouch measure", lambda s, side: _crouch(s, side)[0],
-              "knee, *", "knee *", section=KNEE, part="stance"),
+              "least knee flexion of stance: the crouch measure",
+              lambda s, side: _crouch(s, side)[0], "knee, *", "knee *", section=KNEE, part="stance"),
     *per_side("min_stance_knee_flexion_time_*", "time of least stance knee flexion, *", "s",
               "when that is", lambda s, side: _crouch(s, side)[1], section=KNEE, shown=False),
     Measure("joint_range", "joint ranges", "rad",
@@ -235,6 +235,8 @@ REGISTRY: tuple[Measure, ...] = (
     Measure("peak_activation", "peak activations", "1", "per generator, largest activation",
             lambda s: dict(zip(GENERATORS, s.known("activation").max(axis=0), strict=True)),
             shown=False),
+    Measure("phase_durations", "phase durations", "s", "per phase",
+            lambda s: s.phase_durations, shown=False),
     Measure("positive_muscle_work", "muscles, positive", "J",
             "work that generators did, each for itself",
             lambda s: _work(s, "muscle_torque", 1.0), section=WORK),
@@ -312,8 +314,8 @@ def measures_in(table: str) -> tuple[Measure, ...]:
     Args:
         table: One of `TABLES`; those of "evaluate" and "report" have their keys beside recordings.
     """
-    named = [key for key in TABLES[table] for key in _expanded(key)]
-    elsewhere = {key for keys in TABLES.values() for name in keys for key in _expanded(name)}
+    named = [key for key in TABLES[table] for key in expanded(key)]
+    elsewhere = {key for keys in TABLES.values() for name in keys for key in expanded(name)}
     further = [m.key for m in REGISTRY if m.shown and m.key not in elsewhere]
     found = [measure_of(key) for key in (*named, *further)]
     if table in ("evaluate", "report"):
@@ -321,7 +323,7 @@ def measures_in(table: str) -> tuple[Measure, ...]:
     return tuple(found)
 
 
-def _expanded(key: str) -> tuple[str, ...]:
+def expanded(key: str) -> tuple[str, ...]:
     """Return the keys of both sides where a star stands for them."""
     return tuple(key.replace("*", side) for side in SIDES) if "*" in key else (key,)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +43,7 @@ class Neighbours:
         self.run = run
         self._tell = tell
         limited = with_values(run.config, {"solver.max_iterations": max_iterations})
-        resolver = resolver_of(Run(run.folder, run.metrics, run.motion, limited, run.multipliers))
+        resolver = resolver_of(replace(run, config=limited))
         self._journal = Journal(folder, run, resolver)
         self.optimum = require_optimum(resolver, run, limited.solver.tolerance)
         """The run as an optimum, solved to its tolerance."""

@@ -13,6 +13,7 @@ from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp.ipopt import ProgressReport
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.results.metrics import RunInputs, patient_hash, run_inputs
 from pathwalker_cli.results.run_folder import (
     Run,
     check_target,
@@ -21,7 +22,6 @@ from pathwalker_cli.results.run_folder import (
     warm_start_run,
     write_run,
 )
-from pathwalker_cli.results.run_metrics import RunInputs, patient_hash, run_inputs
 from pathwalker_cli.studies.verdict import Verdict, verdict_of
 from pathwalker_cli.studies.verdict_text import verdict_lines
 

@@ -9,10 +9,8 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.resolve import Optimum
-from pathwalker_cli.results.text import active_bounds
-from pathwalker_cli.stride.measures import measure_of
 
-__all__ = ["Ranges", "Spring", "ends", "free_springs", "require_springs", "spring_ranges"]
+__all__ = ["Ranges", "Spring", "free_springs", "require_springs", "spring_ranges"]
 
 Spring = Literal[
     "dorsiflexion_stiffness_right",
@@ -61,16 +59,3 @@ def spring_ranges(optimum: Optimum) -> dict[str, tuple[float, float]]:
 def free_springs(ranges: Ranges) -> tuple[str, ...]:
     """Return the springs that the problem may choose; the others are prescribed."""
     return tuple(name for name, (low, high) in ranges.items() if low < high)
-
-
-def ends(values: Mapping[str, float], ranges: Ranges) -> dict[str, Literal["lower", "upper"]]:
-    """Return the free springs that sit at an end of their range, and at which.
-
-    Args:
-        values: Stiffness by spring [N m/rad]; other keys do no harm.
-        ranges: Range by spring.
-    """
-    free = {name: ranges[name] for name in free_springs(ranges)}
-    found = {bound.name: bound.end for bound in active_bounds(values, free)}
-    labels = {name: measure_of(name).label for name in free}
-    return {name: found[label] for name, label in labels.items() if label in found}

@@ -21,9 +21,10 @@ from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.io.refusals import dotted
 from pathwalker_cli.model.walker import ANKLES
 from pathwalker_cli.patient.blocks import RealSpring
+from pathwalker_cli.results.text import spring_ends
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.studies.edges import Edge, find_edge
-from pathwalker_cli.studies.springs import ends, spring_ranges
+from pathwalker_cli.studies.springs import spring_ranges
 
 __all__ = [
     "SHARE",
@@ -267,7 +268,7 @@ class _Judge:
         size = abs(self.optimum.cost)
         gradient = float(self.around.cost_gradient[which]) / size
         curvature = self.around.curvature(name) / size
-        limit = ends(stiffness, ranges).get(name, "")
+        limit = spring_ends(stiffness, ranges).get(name, "")
         edges = []
         for end, sign in zip(ranges[name], (-1.0, 1.0), strict=True):
             if limit == {-1.0: "lower", 1.0: "upper"}[sign]:

@@ -20,8 +20,8 @@ from pathwalker_cli.io.special import refuse_special
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.results.metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run, repeatable_config
-from pathwalker_cli.results.run_metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.stride.balance import balance
 from pathwalker_cli.stride.measures import metrics_of

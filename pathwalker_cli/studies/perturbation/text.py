@@ -9,10 +9,10 @@ from typing import Any, Final
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.io.table import write_table
+from pathwalker_cli.results.text import spring_ends
 from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
-from pathwalker_cli.studies.springs import ends
 
 __all__ = [
     "FILES",
@@ -87,7 +87,7 @@ def perturbation_content(result: Perturbation) -> dict[str, Any]:
         "seconds": result.seconds,
         "optimum": dict(result.base),
         "stiffness_ranges": {name: list(pair) for name, pair in result.ranges.items()},
-        "at_limit": ends(result.base, result.ranges),
+        "at_limit": spring_ends(result.base, result.ranges),
         "rows": [
             {
                 "spring": row.spring,
