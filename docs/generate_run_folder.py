@@ -20,9 +20,9 @@ from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, 
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.results.run_folder import ENTRIES
 from pathwalker_cli.results.tables import controls_table, forces_table, states_table, torques_table
+from pathwalker_cli.stride import measures
 from pathwalker_cli.stride.figures import FIGURES
 from pathwalker_cli.stride.measure import Measure
-from pathwalker_cli.stride.measures import REGISTRY
 from pathwalker_cli.stride.series import GaitSeries
 
 PAGE: Final = Path(__file__).with_name("run-folder.md")
@@ -186,7 +186,7 @@ def page() -> str:
 
 def gait_keys() -> dict[str, str]:
     """Return the keys that describe the gait, a star for the side, and what they mean."""
-    return {m.family: _meaning(m) for m in REGISTRY if m.kept and m.value is not None}
+    return {m.family: _meaning(m) for m in measures.REGISTRY if m.kept and m.value is not None}
 
 
 def expanded(key: str) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.model.walker import ANKLES
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.results.tables import TABLES, controls_table, forces_table, torques_table
-from pathwalker_cli.results.text import spring_notes, summary, summary_renderable
+from pathwalker_cli.results.text import spring_notes, summary, summary_renderable, summary_rows
 from pathwalker_cli.stride.figures import (
     FIGURES,
     Band,
@@ -330,7 +330,7 @@ def test_active_bounds_in_words(metrics: dict[str, Any]) -> None:
 def test_summary(metrics: dict[str, Any]) -> None:
     flat = metrics
     notes = spring_notes(flat, RANGES)
-    text = summary(flat, "converged", 1.23456789, notes)
+    text = summary(summary_rows(flat, "converged", 1.23456789), notes)
     for part in (
         "converged",
         "1.2346",
@@ -341,10 +341,13 @@ def test_summary(metrics: dict[str, Any]) -> None:
         assert part in text
     assert text.splitlines()[-1].startswith("note: K_P right sits at its lower limit")
     console = Console(file=StringIO(), width=120)
-    console.print(summary_renderable(flat, "converged", 1.23456789, notes))
+    console.print(summary_renderable(summary_rows(flat, "converged", 1.23456789), notes))
     shown = console.file.getvalue()  # type: ignore[attr-defined]
     assert "\x1b" not in shown
     assert [line.split() for line in shown.splitlines()] == [
         line.split() for line in text.splitlines()
     ]
-    assert "K_D" not in summary(metrics_of(stride_of(stylised_series("barefoot"))), "converged")
+    barefoot = metrics_of(stride_of(stylised_series("barefoot")))
+    assert "K_D" not in summary(
+        summary_rows(metrics_of(stride_of(stylised_series("barefoot"))), "converged")
+    )

@@ -139,6 +139,7 @@ def _report(outcome: Outcome, folder: Path) -> None:
         spring_notes,
         summary,
         summary_renderable,
+        summary_rows,
     )
     from pathwalker_cli.studies.verdict_text import verdict_lines
 
@@ -146,11 +147,11 @@ def _report(outcome: Outcome, folder: Path) -> None:
     if solution.config.smoke:
         click.echo("SMOKE: a quick check on a coarse mesh; its numbers are not for use.\n")
     notes = spring_notes(metrics, stiffness_ranges(solution)) if solution.converged else ()
-    console = Console()
+    console, rows = Console(), summary_rows(metrics, solution.status, solution.cost)
     if console.is_terminal:
-        console.print(summary_renderable(metrics, solution.status, solution.cost, notes))
+        console.print(summary_renderable(rows, notes))
     else:
-        click.echo(summary(metrics, solution.status, solution.cost, notes))
+        click.echo(summary(rows, notes))
     click.echo()
     if verdict is not None:
         click.echo("How sure are the springs?")

@@ -110,44 +110,21 @@ def summary_rows(
     return rows
 
 
-def summary(
-    metrics: Mapping[str, Any],
-    status: str,
-    cost: float | None = None,
-    notes: Iterable[str] = (),
-) -> str:
-    """Return the summary of a run as plain text.
-
-    Args:
-        metrics: Content of `metrics.json`.
-        status: How the solve ended.
-        cost: Value of the objective; left out without one.
-        notes: What else to know, one line each.
-    """
-    rows = summary_rows(metrics, status, cost)
+def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = ()) -> str:
+    """Return labels and values as plain text, then what else to know, one line each."""
     width = max(len(label) for label, _ in rows)
     lines = [f"{label:<{width}}  {value}" for label, value in rows]
     return "\n".join([*lines, *(f"note: {note}" for note in notes)])
 
 
 def summary_renderable(
-    metrics: Mapping[str, Any],
-    status: str,
-    cost: float | None = None,
-    notes: Iterable[str] = (),
+    rows: Sequence[tuple[str, str]], notes: Iterable[str] = ()
 ) -> RenderableType:
-    """Return the same summary for a `rich` console, which drops the colours off a terminal.
-
-    Args:
-        metrics: Content of `metrics.json`.
-        status: How the solve ended.
-        cost: Value of the objective; left out without one.
-        notes: What else to know, one line each.
-    """
+    """Return the same for a `rich` console, which drops the colours off a terminal."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
-    for label, value in summary_rows(metrics, status, cost):
+    for label, value in rows:
         table.add_row(label, Text(value))
     return Group(table, *(Text.assemble(("note: ", "yellow"), note) for note in notes))
 
