@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 
 from pathwalker_cli import build_walker, load_patient
-from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, SIDES, STIFFNESSES
+from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, SIDES
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.results.run_folder import ENTRIES
 from pathwalker_cli.results.tables import controls_table, forces_table, states_table, torques_table
@@ -87,7 +87,7 @@ NumPy arrays.
 | --- | --- |
 | `phases` | names of the phases |
 | `durations` | of the phases [s] |
-| `parameters` | the four stiffnesses [N m/rad]; none barefoot |
+| `parameters` | the numbers that were free to choose, in the order of `unknowns` in `metrics.json`: the four stiffnesses [N m/rad], then what the config frees; none barefoot |
 | `<phase>.mesh` | nodes, from 0 to 1 |
 | `<phase>.states` | coordinates and velocities at the nodes |
 | `<phase>.smooth` | activations at the nodes |
@@ -132,6 +132,8 @@ PROOF: Final = {
     "active_bounds": "names of the bounds that hold the solution back, with value and phases",
     "active": "the same bounds typed: `name`, `side` (`lower` or `upper`), `value`, `places` (phases)",
     "stiffness_ranges": "by stiffness, allowed range [N m/rad]",
+    "unknowns": "every number that was free to choose, in the order of `parameters` in `motion.npz`: name, place in the "
+    "patient's file, value, unit and range [SI]",
     "bound_sources": "by quantity, its bounds and where they come from",
     "notes": "what was filled in or overridden in the patient's file",
     "verdict": "how sure the springs are, see [how sure is a spring](sensitivity.md): `springs` (region [N m/rad], limit, "
@@ -243,10 +245,9 @@ def _standing() -> GaitSeries:
     sizes = {"q": len(COORDINATES), "v": len(COORDINATES), "vdot": len(COORDINATES),
              "activation": len(GENERATORS), "activation_rate": len(GENERATORS),
              "force": len(CONTACT_FORCES), "reserve": len(COORDINATES),
-             "muscle_torque": len(GENERATORS), "orthosis_torque": len(SIDES)}  # fmt: skip
+             "element_force": len(walker.elements)}  # fmt: skip
     zeros: dict[str, Any] = {name: np.zeros((1, size)) for name, size in sizes.items()}
-    phase, stiffness = (PHASE_NAMES[0],), np.zeros(len(STIFFNESSES))
-    return GaitSeries(walker, None, np.zeros(1), phase, **zeros, stiffness=stiffness)  # type: ignore[arg-type]
+    return GaitSeries(walker, None, np.zeros(1), (PHASE_NAMES[0],), **zeros)  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":

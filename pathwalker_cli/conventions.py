@@ -1,8 +1,6 @@
-"""Names, orders, axes, signs and units: the one place that knows them.
+"""Names, orders, units and mirror images of what tables and files hold.
 
-World frame: x forward, z up, rotations about +y (right-hand rule), SI units and radians.
-Positive: pelvis_tilt and lumbar = forward lean, hip = extension, knee = flexion,
-ankle = plantarflexion.  The zero pose is upright with straight legs and feet at 90 degrees.
+Axes and signs stand in `model.skeleton`, from which the generalised coordinates come.
 """
 
 from __future__ import annotations
@@ -11,31 +9,22 @@ from typing import Final, Literal
 
 import numpy as np
 
+from pathwalker_cli.model.contact import FORCES, POINTS
+from pathwalker_cli.model.skeleton import PLANAR_WALKER
+from pathwalker_cli.model.skeleton import SIDES as SIDES
+from pathwalker_cli.model.skeleton import SUFFIX as SUFFIX
+from pathwalker_cli.model.skeleton import Side as Side
+
 GRAVITY: Final = 9.81
 """Gravitational acceleration [m/s^2]."""
 
-COORDINATES: Final = (
-    "pelvis_tx",
-    "pelvis_tz",
-    "pelvis_tilt",
-    "hip_r",
-    "knee_r",
-    "ankle_r",
-    "hip_l",
-    "knee_l",
-    "ankle_l",
-    "lumbar",
-)
+COORDINATES: Final = PLANAR_WALKER.coordinates
 """Generalised coordinates in order: two translations [m], eight angles [rad]."""
 
-TRANSLATIONS: Final = COORDINATES[:2]
-ROOT: Final = COORDINATES[:3]
+ANGLES: Final = PLANAR_WALKER.angles
+TRANSLATIONS: Final = PLANAR_WALKER.translations
+ROOT: Final = PLANAR_WALKER.root
 """Coordinates of the free pelvis: no actuator acts on them."""
-
-Side = Literal["right", "left"]
-SIDES: Final[tuple[Side, Side]] = ("right", "left")
-SUFFIX: Final = {"right": "r", "left": "l"}
-"""Suffix of a side in coordinate and link names."""
 
 LEG_JOINTS: Final = ("hip", "knee", "ankle")
 
@@ -63,17 +52,8 @@ STIFFNESSES: Final = tuple(
 )
 """Free orthosis parameters in order: K_D right, left, K_P right, left [N m/rad]."""
 
-CONTACT_POINTS: Final = ("heel_r", "toe_r", "heel_l", "toe_l")
-CONTACT_FORCES: Final = (
-    "heel_r_x",
-    "heel_r_z",
-    "toe_r_x",
-    "toe_r_z",
-    "heel_l_x",
-    "heel_l_z",
-    "toe_l_x",
-    "toe_l_z",
-)
+CONTACT_POINTS: Final = tuple(point.name for point in POINTS)
+CONTACT_FORCES: Final = tuple(force.name for force in FORCES)
 """Components of the ground reaction forces (on the body) in order [N]."""
 
 CONDITIONS: Final = ("barefoot", "orthosis")

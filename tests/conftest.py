@@ -21,8 +21,9 @@ from pathwalker_cli.config import load_config
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.solution import GaitSolution, StageRecord
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
+from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.problems import PROBLEMS
-from pathwalker_cli.stride.verify import ActiveBound, Reintegration, Violation
+from pathwalker_cli.stride.verify import Reintegration
 
 _LENGTHS = {"short": 15, "long": 3000}
 """Examples of each property; the suite tries the same few ones every time."""

@@ -56,7 +56,7 @@ def _phase(
         for t in (start + duration * mesh, start + duration * points.ravel())
     )
     share = walker.weight / len(contact.points)
-    force = np.array([share * (FRICTION if f.endswith("x") else 1.0) for f in contact.forces])
+    force = np.array([share * (1.0 if f.bears else FRICTION) for f in contact.forces])
     zeros = np.zeros(len(COORDINATES))
     algebraic = np.tile(np.concatenate([zeros, force, zeros]), (INTERVALS, DEGREE, 1))
     return PhaseMotion(

@@ -206,9 +206,9 @@ def rows_of(walker: Walker, motion: PhasedMotion) -> tuple[float, dict[tuple[str
     """Return cost and rows of the program of a walker with orthoses: value by name and place."""
     made = program()
     shared = GaitProblem(walker, "stride", GOALS).shared_values(WEIGHTS, FRICTION)
-    nlp = made.program.functions()["nlp"]
-    cost, values = nlp(made.to_unknowns(motion), made.program.parameters(shared))
-    places = [made.program.row_place(row) for row in range(made.program.rows)]
+    numbers = np.concatenate([shared, made.parameters[len(shared) :]])
+    cost, values = made.functions["nlp"](made.to_unknowns(motion), numbers)
+    places = [made.row_place(row) for row in range(made.rows)]
     found = dict(zip(places, np.asarray(values).ravel().tolist(), strict=True))
     assert len(found) == len(places), "two rows have the same name"
     return float(cost), found

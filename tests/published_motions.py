@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from pathwalker_cli.conventions import CONTACT_FORCES, GENERATORS, SIDES, Condition
+from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, SIDES, Condition
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.model.walker import GENERATOR_ROWS, Walker, build_walker
+from pathwalker_cli.model.elements.muscle import generators
+from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.stride.stride import Stride, phase_stances
 
@@ -135,8 +136,8 @@ def _augmented(rows: int) -> dict[str, Any]:
     points = parts[7].reshape(-1, 4, 3)[:, :, [0, 2]]
     assert len(CONTACT_FORCES) == points[0].size
     tau = np.zeros((rows, 10))
-    for i in range(len(GENERATORS)):
-        tau[:, GENERATOR_ROWS[i]] += torque[:, i]
+    for i, muscle in enumerate(generators()):
+        tau[:, COORDINATES.index(muscle.coordinate)] += torque[:, i]
     return {
         "force": {side: points[:, 2 * i : 2 * i + 2].sum(axis=1)
                   for i, side in enumerate(SIDES)},

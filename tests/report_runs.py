@@ -11,7 +11,7 @@ from conftest import MadeSolution
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
-from pathwalker_cli.studies.verdict import SnappedSprings, SpringVerdict, StopVerdict, Verdict
+from pathwalker_cli.studies.verdict import NumberVerdict, SnappedSprings, StopVerdict, Verdict
 
 HOSTILE = "<script>alert(1)</script>"
 
@@ -19,8 +19,10 @@ HOSTILE = "<script>alert(1)</script>"
 def made_verdict(**changes: Any) -> Verdict:
     """Return a verdict: K_D at its upper limit, K_P left open by the cost."""
     springs = tuple(
-        SpringVerdict(
+        NumberVerdict(
             name,
+            f"K_{name[0].upper()} {name.rpartition('_')[2]}",
+            "N m/rad",
             92.0 if name.startswith("d") else 6.0,
             (5.0, 92.0),
             "upper" if name.startswith("d") else "",
@@ -34,6 +36,7 @@ def made_verdict(**changes: Any) -> Verdict:
     )
     values: dict[str, Any] = {
         "springs": springs,
+        "numbers": (),
         "stops": (StopVerdict("right", "dorsiflexion", -0.13, 0.05, 0.3),),
         "snapped": SnappedSprings(
             {name: "stiff" if name.startswith("d") else "softest" for name in STIFFNESSES},

@@ -26,14 +26,14 @@ from pathwalker_cli.commands.progress import Progress
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.model.urdf import urdf_text
-from pathwalker_cli.nlp.ipopt import ProgressReport
+from pathwalker_cli.nlp.watch import ProgressReport
+from pathwalker_cli.ocp.violations import Violation
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import ENTRIES, load_run, write_run
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import gait_series
 from pathwalker_cli.stride.stride import stride_of
-from pathwalker_cli.stride.verify import Violation
 from pathwalker_cli.studies import run as study_run
 from test_verdict import verdict
 

@@ -124,9 +124,9 @@ def test_block_derivatives_agree_with_those_of_the_whole() -> None:
     problem, numbers = double_integrator(nonlinear=True)
     start = at_rest(problem, 2, 3)
     program = CollocationProgram(CollocationBlocks(problem, 3), numbers, start.meshes)
-    functions = program.program.functions()
+    functions = program.functions
     rng = np.random.default_rng(1)
-    x, lam = rng.normal(size=program.program.size), rng.normal(size=program.program.rows)
+    x, lam = rng.normal(size=program.size), rng.normal(size=program.rows)
     p = program.parameters
     nlp = functions["nlp"]
     gradient = np.asarray(functions["grad_f"](x, p)[1]).ravel()

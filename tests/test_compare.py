@@ -18,10 +18,10 @@ from pathwalker_cli.evaluation import figures
 from pathwalker_cli.evaluation.curves import Trace, traces
 from pathwalker_cli.evaluation.run import gaits_of_runs
 from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report.compare import Compared, compare_runs, comparison_lines
 from pathwalker_cli.stride.measures import measure_of
-from pathwalker_cli.stride.verify import ActiveBound
 from report_runs import write_made_run
 
 CHILD = Path(__file__).parent / "data" / "child-10y" / "patient.yaml"

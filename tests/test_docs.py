@@ -44,7 +44,7 @@ FORBIDDEN = re.compile(
     re.IGNORECASE,
 )
 TOKEN = re.compile(r"@[A-Z][A-Z0-9_]*@")
-# A backticked name below the package, e.g. `model.muscle.activation_rate`.
+# A backticked name below the package, e.g. `model.elements.muscle.activation_rate`.
 NAME = re.compile(
     r"`((?:model|nlp|ocp|gait|stride|patient|inverse|io|conventions|config)(?:\.\w+)+)`"
 )
@@ -204,9 +204,10 @@ def test_no_page_tells_of_the_workshop(path: Path) -> None:
         assert not FORBIDDEN.search(line), f"line {number}: {line}"
 
 
-def test_every_name_in_the_theory_exists() -> None:
-    names = NAME.findall(text_of("docs/theory.md"))
-    assert len(names) > 40
+@pytest.mark.parametrize(("page", "least"), [("theory", 40), ("numerics", 25)])
+def test_every_name_in_the_theory_exists(page: str, least: int) -> None:
+    names = NAME.findall(text_of(f"docs/{page}.md"))
+    assert len(names) > least
     assert [name for name in names if not resolves(name)] == []
 
 
@@ -241,7 +242,8 @@ def test_theory_states_the_phases_as_they_are() -> None:
     assert [name for name, _ in rows] == [phase.name for phase in PHASES]
     following = PHASES[1:] + PHASES[:1]
     for (_, cells), phase, after in zip(rows, PHASES, following, strict=True):
-        wanted = (phase.forces, phase.touched_down(after), phase.lifted_off(after))
+        parts = (phase.forces, phase.touched_down(after), phase.lifted_off(after))
+        wanted = tuple(tuple(force.name for force in part) for part in parts)
         for cell, forces in zip(cells.split("|"), wanted, strict=True):
             assert spelled_out(cell) == set(forces)
 
@@ -303,6 +305,21 @@ def test_python_page_runs() -> None:
     exec("\n".join(imports), names)
     exec(others[-1], names)
     assert {"solve_study", "run_study", "load_run"} <= names.keys()
+
+
+def test_numerics_page_solves_its_example() -> None:
+    solve, follow = blocks("docs/numerics.md", "python")
+    names: dict[str, Any] = {}
+    exec(solve, names)
+    assert names["result"].converged
+    assert names["result"].objective == pytest.approx(12.0, rel=1e-9)
+    wanted = 6.0 - 12.0 * np.linspace(0.0, 1.0, 5)
+    assert names["motion"].phases[0].smooth[:, 0] == pytest.approx(wanted, abs=1e-8)
+    exec(follow, names)
+    answer = names["KktSystem"](names["program"], names["result"]).answer(
+        names["below"], names["above"], 1e-4
+    )
+    assert answer.cost == pytest.approx(24.0, rel=1e-6)
 
 
 def test_citation_is_complete_and_of_this_version() -> None:

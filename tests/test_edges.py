@@ -43,24 +43,24 @@ def test_the_edge_of_a_parabola_is_found(step: float, limit: float) -> None:
     assert edge.certain
     assert not edge.limit
     assert edge.rise == pytest.approx(0.05, rel=0.1)
-    assert abs(edge.stiffness - 40.0) == pytest.approx(20.0, rel=0.06)
+    assert abs(edge.value - 40.0) == pytest.approx(20.0, rel=0.06)
 
 
 def test_a_flat_cost_reaches_the_limit_of_the_range() -> None:
     edge = search(lambda k: 1.0 + 1e-5 * k, 40.0, 92.0, 1e4)
     assert edge.limit
     assert edge.certain
-    assert (edge.stiffness, edge.solves) == (92.0, 1)
+    assert (edge.value, edge.solves) == (92.0, 1)
 
 
 def test_a_slope_at_a_limit_is_followed_inwards() -> None:
     edge = search(lambda k: 1.0 + 0.002 * (92.0 - k), 92.0, 5.0, 10.0)
-    assert edge.stiffness == pytest.approx(92.0 - 25.0, rel=0.05)
+    assert edge.value == pytest.approx(92.0 - 25.0, rel=0.05)
 
 
 def test_a_negative_cost_rises_relative_to_its_size() -> None:
     edge = search(lambda k: -2.0 + 0.1 * ((k - 40.0) / 10.0) ** 2, 40.0, 92.0, 8.0)
-    assert edge.stiffness == pytest.approx(50.0, rel=0.02)
+    assert edge.value == pytest.approx(50.0, rel=0.02)
 
 
 def test_a_solve_that_fails_is_tried_nearer() -> None:
@@ -68,14 +68,14 @@ def test_a_solve_that_fails_is_tried_nearer() -> None:
         lambda k: 1.0 + 0.05 * ((k - 40.0) / 20.0) ** 2, 40.0, 92.0, 20.0,
         fails=lambda stiffness, origin: abs(stiffness - origin) > 12.0,
     )  # fmt: skip
-    assert edge.stiffness == pytest.approx(60.0, abs=8.0)
+    assert edge.value == pytest.approx(60.0, abs=8.0)
     assert edge.rise <= 0.055
 
 
 def test_an_edge_that_nothing_encloses_is_not_certain() -> None:
     edge = search(lambda k: 1.0, 40.0, 92.0, 20.0, fails=lambda stiffness, origin: True)
     assert not edge.certain
-    assert edge.stiffness == 40.0
+    assert edge.value == 40.0
 
 
 def test_a_second_basin_at_the_limit_is_seen() -> None:

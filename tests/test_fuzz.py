@@ -252,7 +252,7 @@ def test_c3d_files_with_some_bytes_changed(seed: int) -> None:
 def test_kept_tapes_with_some_bytes_changed_are_not_there(seed: int, content: bytes) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PATHWALKER_CACHE", str(folder() / "cache"))
-        patch.setattr(tape_store, "_makers", lambda: "made")
+        patch.setattr(tape_store, "_made_by", lambda makers: "made")
         tape_store.keep_tapes("a", {})
         (path,) = (folder() / "cache").glob("*.tapes")
         assert tape_store.kept_tapes("a") == {}

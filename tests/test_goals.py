@@ -37,10 +37,10 @@ def expected(motion: PhasedMotion) -> dict[str, float]:
         def over(values: Any, at: np.ndarray = at, duration: float = phase.duration) -> float:
             return duration * float(np.trapezoid(np.broadcast_to(values, at.shape), at))
 
-        crouch += sum(over(angle[f"knee_{s}"] ** 2) for s in {p[-1] for p in contact.points})
+        crouch += sum(over(angle[f"knee_{s}"] ** 2) for s in {side[0] for side in contact.feet})
         # forces of the made motion do not change within a phase
         force = phase.algebraic[0, 0, N : N + len(contact.forces)]
-        load = dict(zip(contact.forces, force, strict=True))
+        load = dict(zip(contact.force_names, force, strict=True))
         for s in "rl":
             arm = load.get(f"toe_{s}_z", 0.0) - load.get(f"heel_{s}_z", 0.0)
             pressure += over((arm / WEIGHT) ** 2)

@@ -29,7 +29,7 @@ from pathwalker_cli.commands.complete import (
 from pathwalker_cli.commands.examples import EXAMPLES
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution
-from pathwalker_cli.nlp.ipopt import ProgressReport
+from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.studies import run as study_run

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -15,7 +16,12 @@ PACKAGE = Path(pathwalker_cli.__file__).parent
 ROOT = "pathwalker_cli"
 
 LAYERS = (
-    {"conventions", "errors", "paths", "versions"},
+    {"errors", "paths"},
+    {"nlp"},
+    {"ocp"},
+    {"versions", "model.skeleton"},
+    {"model.contact", "model.numbers"},
+    {"conventions"},
     {"trajectory"},
     {"io"},
     {"patient.blocks", "patient.proportions"},
@@ -24,9 +30,6 @@ LAYERS = (
     {"model"},
     {"problems", "patient.variation", "gait.goals"},
     {"config"},
-    {"nlp.frozen"},
-    {"ocp.problem", "ocp.phased"},
-    {"ocp", "nlp"},
     {"stride"},
     {"gait", "inverse", "ocp.solve"},
     {"results"},
@@ -45,7 +48,6 @@ CONFINED = {
     "casadi": ("model", "nlp", "ocp", "stride", "gait", "commands.doctor"),
     "pinocchio": (
         "model",
-        "nlp",
         "gait",
         "inverse",
         "stride",
@@ -182,3 +184,17 @@ def test_every_entry_names_something_that_exists() -> None:
     assert sum(map(len, LAYERS)) == len(set().union(*LAYERS)), "a part stands in two layers"
     for part in parts:
         assert any(covers(part, name) for name in modules()), part
+
+
+WALKING = re.compile(
+    r"\b(gait|stride|patient|muscle|orthos|stiffness|knee|hip_|ankle|toe|heel|pinocchio)",
+    re.IGNORECASE,
+)
+
+
+@pytest.mark.parametrize("name", [name for name in modules() if re.match(r"nlp|ocp", name)])
+def test_the_numerical_layer_speaks_of_no_walking(name: str) -> None:
+    if name == "ocp.solve":  # the name by which scripts import `solve_study`
+        return
+    for number, line in enumerate(modules()[name].read_text(encoding="utf-8").splitlines(), 1):
+        assert not WALKING.search(line.replace("PathWalker", "")), f"{name}, line {number}: {line}"

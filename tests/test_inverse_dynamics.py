@@ -34,7 +34,7 @@ from pathwalker_cli.inverse.strengths import (
     strengths_of,
 )
 from pathwalker_cli.io.c3d import read_c3d
-from pathwalker_cli.model.muscle import generators
+from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.trajectory import Trajectory

@@ -12,7 +12,7 @@ from pathwalker_cli.gait.resolve import Resolver, warm_start_for
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp.ipopt import IpoptSettings, solve_program
 from pathwalker_cli.nlp.kkt import KktSystem
-from pathwalker_cli.nlp.symmetric import SymmetricSystem
+from pathwalker_cli.nlp.stage_ldl import SymmetricSystem
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers

@@ -41,8 +41,8 @@ def image_of(stride: PhasedMotion) -> PhasedMotion:
 def turned(phase: PhaseMotion, i: int, shift: float, costs: np.ndarray) -> PhaseMotion:
     """Return phase i with left and right exchanged, elsewhere."""
     here, there = PHASES[i], PHASES[(i + HALF) % len(PHASES)]
-    names = ACCELERATIONS + here.forces + RESERVES
-    order = [names.index(mirrored(n)) for n in ACCELERATIONS + there.forces + RESERVES]
+    names = ACCELERATIONS + here.force_names + RESERVES
+    order = [names.index(mirrored(n)) for n in ACCELERATIONS + there.force_names + RESERVES]
     of_states = mirror_permutation(COORDINATES + VELOCITIES)
     states, inner = phase.states[:, of_states], phase.inner_states[..., of_states]
     states[:, 0] += shift
@@ -70,8 +70,7 @@ def study_of(patient: Patient, folder: Path) -> StudyConfig:
 def cost_of(solver: GaitSolver, motion: PhasedMotion) -> float:
     """Return the cost of a motion."""
     program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)
-    parameters = program.program.parameters(solver.prediction.shared)
-    return float(program.program.functions()["nlp"](program.to_unknowns(motion), parameters)[0])
+    return float(program.functions["nlp"](program.to_unknowns(motion), program.parameters)[0])
 
 
 def test_the_solution_of_the_mirror_image_is_mirrored(tmp_path: Path) -> None:

@@ -21,7 +21,6 @@ from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.io.atomic import atomic_open, atomic_path
 from pathwalker_cli.io.json_file import json_text, write_json
 from pathwalker_cli.io.trajectory_csv import read_trajectory
-from pathwalker_cli.model.walker import ANKLES
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.results.tables import TABLES, controls_table, forces_table, torques_table
 from pathwalker_cli.results.text import spring_notes, summary, summary_renderable, summary_rows
@@ -119,7 +118,8 @@ def test_work_of_a_constant_torque_on_a_constant_speed(series: GaitSeries) -> No
     v, muscle = np.zeros_like(series.v), np.zeros_like(series.muscle_torque)
     v[:, COORDINATES.index("lumbar")] = -2.0
     muscle[:, GENERATORS.index("lumbar_extension")] = 3.0
-    result = metrics_of(stride_of(replace(series, v=v, muscle_torque=muscle)))
+    forces = np.hstack([muscle, np.zeros((len(muscle), 2))])
+    result = metrics_of(stride_of(replace(series, v=v, element_force=forces)))
     assert result["positive_muscle_work"] == 0.0
     assert result["negative_muscle_work"] == pytest.approx(-6.0 * GAIT.stride_time)
     assert result["peak_joint_moment"]["lumbar"] == pytest.approx(3.0)
@@ -128,9 +128,10 @@ def test_work_of_a_constant_torque_on_a_constant_speed(series: GaitSeries) -> No
 
 
 def test_slope_of_a_linear_ankle(series: GaitSeries) -> None:
-    torque = 4.0 - 80.0 * series.q[:, list(ANKLES)]
+    torque = 4.0 - 80.0 * np.column_stack([series.column(name) for name in ("ankle_r", "ankle_l")])
     spring = replace(
-        series, muscle_torque=np.zeros_like(series.muscle_torque), orthosis_torque=torque
+        series,
+        element_force=np.hstack([np.zeros_like(series.muscle_torque), torque]),
     )
     for side in SIDES:
         assert ankle_torque_line(stride_of(spring), side) == pytest.approx((80.0, 4.0))
@@ -348,6 +349,4 @@ def test_summary(metrics: dict[str, Any]) -> None:
         line.split() for line in text.splitlines()
     ]
     barefoot = metrics_of(stride_of(stylised_series("barefoot")))
-    assert "K_D" not in summary(
-        summary_rows(metrics_of(stride_of(stylised_series("barefoot"))), "converged")
-    )
+    assert "K_D" not in summary(summary_rows(barefoot, "converged"))

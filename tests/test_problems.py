@@ -19,7 +19,7 @@ from pathwalker_cli.gait.starts import solve_from_starts, spread_starts
 from pathwalker_cli.gait.symmetry import asymmetries
 from pathwalker_cli.io.recordings import read_recording
 from pathwalker_cli.model.contact import PHASES
-from pathwalker_cli.model.muscle import activation_rate, excitation_from_rate
+from pathwalker_cli.model.elements.muscle import activation_rate, excitation_from_rate
 from pathwalker_cli.stride.verify import reintegrate
 
 PATIENT, HEALTHY = "sreenivasa2017-patient", "sreenivasa2017-healthy"
@@ -63,7 +63,7 @@ def test_mirroring_twice_changes_nothing() -> None:
     assert mirrored("dorsiflexion_stiffness_left") == "dorsiflexion_stiffness_right"
     half = len(PHASES) // 2
     for phase, other in zip(PHASES[:half], PHASES[half:], strict=True):
-        assert {mirrored(force) for force in phase.forces} == set(other.forces)
+        assert {mirrored(force) for force in phase.force_names} == set(other.force_names)
 
 
 def test_symbolic_excitation_is_the_inverse_of_the_activation_rate() -> None:
@@ -128,7 +128,9 @@ def test_starts_are_spread_and_repeatable() -> None:
     assert studies[0].start == config.start
     assert all(study.starts == 1 for study in studies)
     lower, upper = solver.bounds.table.find("dorsiflexion_stiffness_left") or (0.0, 0.0)
-    springs = [study.start.stiffness["dorsiflexion_stiffness_left"] for study in studies[1:]]
+    springs = [
+        study.start.free["orthosis.stiffness_guess.dorsiflexion.left"] for study in studies[1:]
+    ]
     assert all(lower <= value <= upper for value in springs)
     assert len({round(study.start.knee_flexion, 6) for study in studies}) == len(studies)
     other = config.model_copy(update={"start": config.start.model_copy(update={"seed": 8})})

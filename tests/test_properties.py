@@ -57,8 +57,8 @@ from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.model.anthropometry import segments, total_mass
 from pathwalker_cli.model.contact import PHASE_NAMES, PHASES
-from pathwalker_cli.model.curves import BezierChain, evaluate
-from pathwalker_cli.model.muscle import (
+from pathwalker_cli.model.elements.curves import BezierChain, evaluate
+from pathwalker_cli.model.elements.muscle import (
     ACTIVATION_TIME,
     DEACTIVATION_TIME,
     AndersonCurves,
@@ -66,7 +66,7 @@ from pathwalker_cli.model.muscle import (
     curves_of,
     excitation_from_rate,
 )
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_curve, orthosis_torque
+from pathwalker_cli.model.elements.orthosis import OrthosisSide, orthosis_curve, orthosis_torque
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.patient import Patient, load_patient
@@ -241,12 +241,13 @@ def test_torques_follow_strengths_and_stiffnesses(
     patient: Patient, factor: float, seed: int
 ) -> None:
     walker = build_walker(patient, "orthosis")
-    stronger = replace(walker, max_isometric_torque=factor * walker.max_isometric_torque)
+    strengths = [muscle.numbers[0].address for muscle in walker.muscles]
+    stronger = walker.with_values({a: factor * walker.values[a] for a in strengths})
     (q, v), a = pose(seed), np.random.default_rng(seed).random(14)
     muscle = walker.muscle_torques(q, v, a)
     close(stronger.muscle_torques(q, v, a), factor * muscle, 1e-13)
     close(walker.muscle_torques(q, v, 0.5 * a), 0.5 * muscle, 1e-13)
-    signs = np.array([g.torque_sign for g in walker.generators])
+    signs = np.array([g.torque_sign for g in walker.muscles])
     assert (signs * muscle >= -1e-12 * np.abs(muscle).max()).all()
     sides = walker.orthosis or ()
     angle, (k_d, k_p) = np.linspace(-0.6, 0.6, 41), np.random.default_rng(seed).uniform(5, 90, 2)

@@ -17,6 +17,7 @@ from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.trajectory_csv import read_trajectory
+from pathwalker_cli.ocp.violations import Violation
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.motion_file import read_motion, write_motion
 from pathwalker_cli.results.run_folder import (
@@ -28,7 +29,6 @@ from pathwalker_cli.results.run_folder import (
     warm_start_run,
     write_run,
 )
-from pathwalker_cli.stride.verify import Violation
 
 MadeSolution = Callable[..., GaitSolution]
 FIELDS = ("mesh", "states", "smooth", "controls", "integrals", "inner_states", "algebraic")

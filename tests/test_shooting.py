@@ -22,7 +22,7 @@ from pathwalker_cli.gait.shooting import (
 )
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.contact import PHASES
-from pathwalker_cli.model.muscle import (
+from pathwalker_cli.model.elements.muscle import (
     ACTIVATION_TIME,
     DEACTIVATION_TIME,
     activation_rate,
@@ -187,9 +187,9 @@ def test_interval_map_agrees_with_a_second_integrator_and_model(i: int) -> None:
 def test_integrated_stages_meet_the_rows_of_the_program() -> None:
     """An integrated motion misses only ends of intervals, path and boundary rows."""
     program, nodes = _program()
-    rows = np.asarray(program.program.functions()["nlp"](
+    rows = np.asarray(program.functions["nlp"](
         program.from_nodes(nodes), program.parameters)[1]).ravel()  # fmt: skip
-    places = [program.program.row_place(k) for k in range(rows.size)]
+    places = [program.row_place(k) for k in range(rows.size)]
     formulae = [k for k, (name, _) in enumerate(places) if " at stage " in name]
     inside = [k for k, (name, where) in enumerate(places)
               if name.endswith(" at end") and where.endswith("interval 1 step 1")]  # fmt: skip
@@ -204,10 +204,10 @@ def test_integrated_stages_meet_the_rows_of_the_program() -> None:
 
 def test_derivatives_agree_with_finite_differences() -> None:
     program, nodes = _program(0.05)
-    functions, p = program.program.functions(), program.parameters
+    functions, p = program.functions, program.parameters
     rng = np.random.default_rng(3)
-    x = program.from_nodes(nodes) + 1e-2 * rng.normal(size=program.program.size)
-    lam = rng.normal(size=program.program.rows)
+    x = program.from_nodes(nodes) + 1e-2 * rng.normal(size=program.size)
+    lam = rng.normal(size=program.rows)
     jacobian = ca.DM(functions["jac_g"](x, p)[1])
     hessian = ca.DM(functions["hess_lag"](x, p, 0.7, lam))
     hessian = hessian + ca.triu(hessian, False).T
@@ -229,9 +229,9 @@ def test_derivatives_agree_with_finite_differences() -> None:
 def test_no_row_and_no_unknown_is_constrained_twice() -> None:
     """The Jacobian of equalities has full rank at a random point: no zero in its triangle."""
     program, nodes = _program()
-    nlp, (lower, upper) = program.program, program.bounds
-    jacobian = ca.DM(nlp.functions()["jac_g"](program.from_nodes(nodes), program.parameters)[1])
-    rows, columns = np.flatnonzero(nlp.lower == nlp.upper), np.flatnonzero(lower < upper)
+    (lower, upper), (low, high) = program.bounds, program.row_bounds
+    jacobian = ca.DM(program.functions["jac_g"](program.from_nodes(nodes), program.parameters)[1])
+    rows, columns = np.flatnonzero(low == high), np.flatnonzero(lower < upper)
     equal = jacobian[rows.tolist(), columns.tolist()]
     assert equal.size1() < equal.size2()
     triangle = ca.qr_sparse(equal.T)[1]
@@ -321,7 +321,7 @@ def test_double_integrator_reaches_the_closed_form_optimum() -> None:
     edges = Shooter(blocks, numbers, nodes).choose(1e-6)
     program = ShootingProgram(blocks, numbers, meshes, edges)
     start = program.from_nodes(nodes)
-    result = solve_program(cast(Any, program), start, IpoptSettings(tolerance=1e-9))
+    result = solve_program(program, start, IpoptSettings(tolerance=1e-9))
     assert result.converged
     assert result.objective == pytest.approx(12.0, rel=1e-9)
     found = program.nodes(result.unknowns)

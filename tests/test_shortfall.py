@@ -23,10 +23,10 @@ def test_help_counts_for_the_muscle_that_pulls_its_way_and_small_help_does_not()
     series = stylised_series("barefoot")
     reserve = np.zeros_like(series.reserve)
     knee, ankle = COORDINATES.index("knee_r"), COORDINATES.index("ankle_l")
-    extension = next(g for g in series.walker.generators if g.name == "knee_extension_r")
+    extension = next(g for g in series.walker.muscles if g.name == "knee_extension_r")
     reserve[10, knee] = 6.0 * extension.torque_sign
     strength = series.walker.max_isometric_torque[GENERATORS.index("ankle_flexion_l")]
-    flexion = next(g for g in series.walker.generators if g.name == "ankle_flexion_l")
+    flexion = next(g for g in series.walker.muscles if g.name == "ankle_flexion_l")
     reserve[20, ankle] = 0.009 * strength * flexion.torque_sign
     (missing,) = missing_torques(replace(series, reserve=reserve))
     assert missing.generator == "knee_extension_r"

@@ -11,9 +11,8 @@ from scipy import sparse
 from pathwalker_cli.config import load_config
 from pathwalker_cli.gait.mesh import first
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.nlp.elimination import Elimination, in_order_of, stage_keys
 from pathwalker_cli.nlp.kernels import kernels
-from pathwalker_cli.nlp.stage_ldl import StageFactors, stage_factors
+from pathwalker_cli.nlp.stage_ldl import Elimination, StageFactors, in_order_of, stage_factors
 from pathwalker_cli.ocp.collocation import CollocationProgram
 
 pytestmark = pytest.mark.skipif(
@@ -61,7 +60,7 @@ def test_solutions_and_inertia_are_those_of_dense_algebra(seed: int) -> None:
     solution += ldl.solve(right - matrix @ solution)  # pivots are weak, as IPOPT refines
     scale = np.abs(matrix).max() * np.abs(solution).max()
     assert np.abs(matrix @ solution - right).max() < 1e-9 * scale
-    assert ldl.negative == (np.linalg.eigvalsh(matrix) < 0).sum()
+    assert ldl.report.negative == (np.linalg.eigvalsh(matrix) < 0).sum()
 
 
 def test_slacks_are_eliminated_with_their_rows() -> None:
@@ -82,7 +81,7 @@ def test_slacks_are_eliminated_with_their_rows() -> None:
     right = rng.normal(size=len(matrix))
     expected = np.linalg.solve(matrix, right)
     assert ldl.solve(right) == pytest.approx(expected, rel=1e-6, abs=1e-7)
-    assert ldl.negative == (np.linalg.eigvalsh(matrix) < 0).sum()
+    assert ldl.report.negative == (np.linalg.eigvalsh(matrix) < 0).sum()
 
 
 def test_a_singular_matrix_is_refused() -> None:
@@ -114,8 +113,7 @@ def test_groups_are_small_whatever_the_mesh(solver: GaitSolver) -> None:
         mesh = solver.config.mesh.model_copy(update={"intervals": intervals})
         meshes = first(solver.stride.durations, mesh)
         program = CollocationProgram(solver.blocks, solver.prediction, meshes)
-        unknowns, rows = stage_keys(program)
-        keys = np.concatenate([unknowns, rows])
+        keys = np.concatenate(program.elimination_keys)
         order = in_order_of(keys)
         assert sorted(order.order.tolist()) == list(range(len(keys)))
         largest.append(np.diff(order.ends[:-1], prepend=0).max())

@@ -14,7 +14,7 @@ from pathwalker_cli.config import load_config
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp import blocks
-from pathwalker_cli.nlp.blocks import Block, BlockProgram, Occurrences
+from pathwalker_cli.nlp.blocks import Block, BlockProgram, Expressions, Occurrences
 from pathwalker_cli.nlp.kernels import kernels
 from pathwalker_cli.nlp.tape import OPERATIONS, Tape
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -82,10 +82,10 @@ needs_kernels = pytest.mark.skipif(
 
 def without_kernels(monkeypatch: pytest.MonkeyPatch, program: BlockProgram) -> Mapping:
     """Return the functions of a program where no kernels were compiled."""
-    same = BlockProgram(program.size, program.occurrences, program.shared_size)
+    same = BlockProgram(program.size, program.occurrences, program._shared)
     with monkeypatch.context() as patch:
         patch.setattr(blocks, "kernels", lambda: None)
-        return same.functions()
+        return same.functions
 
 
 def assert_same(taped: Mapping, mapped: Mapping, inputs: list, rtol: float) -> None:
@@ -111,6 +111,12 @@ def occurrences(block: Block, columns: np.ndarray, data: np.ndarray) -> Occurren
     return Occurrences(block, columns, data, zeros, zeros, np.ones(block.rows), names, labels)
 
 
+def block_of(unknowns: ca.SX, rows: ca.SX, cost: ca.SX | None = None) -> Block:
+    """Return a block without data and shared numbers."""
+    none, cost = ca.SX(0, 1), ca.SX(0) if cost is None else cost
+    return Block("block", lambda: Expressions(unknowns, none, none, rows, cost))
+
+
 def random_block(rng: np.random.Generator, name: str, objective: bool) -> Block:
     """Return a block whose random expressions use data and shared numbers too."""
     unknowns, data, shared = ca.SX.sym("x", 5), ca.SX.sym("d", 2), ca.SX.sym("s", 3)
@@ -122,7 +128,8 @@ def random_block(rng: np.random.Generator, name: str, objective: bool) -> Block:
                    smooth[rng.integers(len(smooth))](x)]  # fmt: skip
         known.append(ca.tanh(options[rng.integers(len(options))]))
     cost = ca.sumsqr(ca.vertcat(*known[-3:])) if objective else ca.SX(0)
-    return Block(name, unknowns, data, shared, ca.vertcat(*known[-8:-4], shared[0]), cost)
+    rows = ca.vertcat(*known[-8:-4], shared[0])
+    return Block(name, lambda: Expressions(unknowns, data, shared, rows, cost))
 
 
 def test_the_kernels_are_compiled() -> None:
@@ -145,16 +152,16 @@ def test_an_operation_agrees_to_the_last_bit(name: str) -> None:
     values = np.concatenate([normal, np.abs(normal), 3 * normal, pairs], axis=1)
     x = ca.SX.sym("x", 2)
     result = UNARY[name](x[0]) if name in UNARY else BINARY[name](x[0], x[1])
-    block = Block("operation", x, ca.SX(0, 1), ca.SX(0, 1), result)
-    codes = Tape.of(block.values).code[:, 0]
+    block = block_of(x, result)
+    codes = Tape.of(block.functions["values"]).code[:, 0]
     assert OPERATIONS.index(name) in codes
     columns = np.arange(values.size).reshape(values.shape, order="F")
     program = BlockProgram(
-        values.size, [occurrences(block, columns, np.zeros((0, values.shape[1])))], 0
+        values.size, [occurrences(block, columns, np.zeros((0, values.shape[1])))], np.zeros(0)
     )
     unknowns = values.ravel(order="F")
-    got = np.asarray(program.functions()["nlp"](unknowns, [])[1]).ravel()
-    wanted = np.asarray(block.values.map(values.shape[1])(values, [], [])[0]).ravel()
+    got = np.asarray(program.functions["nlp"](unknowns, [])[1]).ravel()
+    wanted = np.asarray(block.functions["values"].map(values.shape[1])(values, [], [])[0]).ravel()
     np.testing.assert_array_equal(got, wanted)
 
 
@@ -170,20 +177,20 @@ def test_programs_agree_for_every_filling_of_lanes(
         columns = np.array([rng.permutation(size)[:5] for _ in range(number)]).T
         block = random_block(rng, name, objective=name != "second")
         parts.append(occurrences(block, columns, rng.normal(size=(2, number))))
-    program = BlockProgram(size, parts, 3)
-    parameters, multipliers = program.parameters(rng.normal(size=3)), rng.normal(size=program.rows)
-    inputs = [rng.normal(size=size), parameters, 0.7, multipliers]
-    assert_same(program.functions(), without_kernels(monkeypatch, program), inputs, 1e-13)
+    program = BlockProgram(size, parts, rng.normal(size=3))
+    multipliers = rng.normal(size=program.rows)
+    inputs = [rng.normal(size=size), program.parameters, 0.7, multipliers]
+    assert_same(program.functions, without_kernels(monkeypatch, program), inputs, 1e-13)
 
 
 @needs_kernels
 def test_an_unknown_operation_takes_the_other_path() -> None:
     x = ca.SX.sym("x", 2)
     assert ca.erfinv(x).shape == (2, 1)
-    odd = Block("odd", x, ca.SX(0, 1), ca.SX(0, 1), ca.erfinv(x))
-    assert Tape.of(odd.values) is None
+    odd = block_of(x, ca.erfinv(x))
+    assert Tape.of(odd.functions["values"]) is None
     parts = [occurrences(odd, np.arange(6).reshape(2, 3), np.zeros((0, 3)))]
-    functions = BlockProgram(6, parts, 0).functions()
+    functions = BlockProgram(6, parts, np.zeros(0)).functions
     assert not any(isinstance(f, ca.Callback) for f in functions.values())
     values = np.linspace(-0.5, 0.5, 6)
     got = np.asarray(functions["nlp"](values, [])[1]).ravel()
@@ -199,13 +206,13 @@ def test_gait_programs_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None
     config, stride = solver.config, solver.stride
     meshes = meshing.first(stride.durations[: len(solver.gait.phases)], config.mesh)
     program = CollocationProgram(solver.blocks, solver.prediction, meshes)
-    stiffness, costs = solver.stiffness_guess(), len(solver.gait.integrals)
+    stiffness, costs = solver.parameter_guess(), len(solver.gait.integrals)
     motion = stride.motion(solver.walker, stiffness, meshes, config.mesh.degree, costs)
     rng = np.random.default_rng(1)
-    unknowns = program.to_unknowns(motion) + 0.01 * rng.normal(size=program.program.size)
-    inputs = [unknowns, program.parameters, 1.3, rng.normal(size=program.program.rows)]
-    mapped = without_kernels(monkeypatch, program.program)
-    assert_same(program.program.functions(), mapped, inputs, 1e-12)
+    unknowns = program.to_unknowns(motion) + 0.01 * rng.normal(size=program.size)
+    inputs = [unknowns, program.parameters, 1.3, rng.normal(size=program.rows)]
+    mapped = without_kernels(monkeypatch, program)
+    assert_same(program.functions, mapped, inputs, 1e-12)
 
 
 @needs_kernels
@@ -213,9 +220,9 @@ def test_solvers_take_them() -> None:
     """Minimise x0^2 + x1^2 with x0 + x1 = 2, by functions that only the mapping keeps alive."""
     x = ca.SX.sym("x", 2)
     row, cost = x[0] + x[1] - 2, ca.sumsqr(x)
-    block = Block("line", x, ca.SX(0, 1), ca.SX(0, 1), row, cost)
+    block = block_of(x, row, cost)
     parts = [occurrences(block, np.arange(2)[:, None], np.zeros((0, 1)))]
-    functions = BlockProgram(2, parts, 0).functions()
+    functions = BlockProgram(2, parts, np.zeros(0)).functions
     gc.collect()
     options = {"ipopt": {"print_level": 0, "sb": "yes"}, "print_time": False, "calc_lam_p": False}
     options |= {key: functions[key] for key in ("grad_f", "jac_g", "hess_lag")}

@@ -8,16 +8,18 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import pathwalker_cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.gait import mesh as meshing
+from pathwalker_cli.gait import structures
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.gait.structures import gait_blocks
 from pathwalker_cli.nlp import tape_store
 from pathwalker_cli.nlp.assembly import KINDS
-from pathwalker_cli.nlp.blocks import Block, KeptBlock
+from pathwalker_cli.nlp.blocks import Expressions
 from pathwalker_cli.nlp.kernels import kernels, kernels_path
 from pathwalker_cli.nlp.tape import Tape
 from pathwalker_cli.nlp.tape_store import cache_folder, keep_tapes, kept_tapes
@@ -68,32 +70,32 @@ def test_what_was_kept_is_found_again(folder: Path) -> None:
 
 def test_other_code_or_versions_find_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     keep_tapes("a", BLOCKS)
-    monkeypatch.setattr(tape_store, "_makers", lambda: "other code")
+    monkeypatch.setattr(tape_store, "_made_by", lambda makers: "other code")
     assert kept_tapes("a") is None
 
 
 def test_other_versions_have_another_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = [tape_store._makers.__wrapped__()]
-    for library in (np, tape_store.pin):
-        monkeypatch.setattr(library, "__version__", "0.0")
-        names.append(tape_store._makers.__wrapped__())
+    assert pin.__version__ in structures._MAKERS
+    names = [tape_store._made_by.__wrapped__(makers) for makers in (("1.0",), ("0.0",))]
+    monkeypatch.setattr(np, "__version__", "0.0")
+    names.append(tape_store._made_by.__wrapped__(("1.0",)))
     assert None not in names
     assert len(set(names)) == 3
 
 
 def test_sources_and_libraries_are_in_the_name(monkeypatch: pytest.MonkeyPatch) -> None:
     package = Path(pathwalker_cli.__file__).parent
-    files = list(tape_store._maker_files(package))
+    files = list(tape_store._maker_files(package, structures._MAKERS))
     assert {*package.rglob("*.py")} < {*files}
     assert {file.name for file in files if file.suffix == ".so"} == {
         kernels_path().name,
         "libpinocchio_casadi.so",
     }
-    before = tape_store._makers.__wrapped__()
+    before = tape_store._made_by.__wrapped__()
     read = Path.read_bytes
     end = {files[3]: b"# changed"}
     monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + end.get(path, b""))
-    assert tape_store._makers.__wrapped__() not in (before, None)
+    assert tape_store._made_by.__wrapped__() not in (before, None)
 
 
 def test_other_structures_have_another_name(folder: Path) -> None:
@@ -108,7 +110,7 @@ def test_sources_that_changed_under_a_process_are_not_trusted(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What runs may be what the file was, so that nothing must be kept under its new name."""
-    monkeypatch.setattr(tape_store, "_makers", tape_store._makers.__wrapped__)
+    monkeypatch.setattr(tape_store, "_made_by", tape_store._made_by.__wrapped__)
     keep_tapes("a", BLOCKS)
     assert kept_tapes("a") is not None
     now = pathwalker_cli.SOURCES
@@ -227,14 +229,14 @@ def test_a_further_process_derives_nothing(folder: Path, monkeypatch: pytest.Mon
     assert file_of(folder).suffix == ".tapes"
     monkeypatch.setitem(gait_blocks.__globals__, "_BUILT", {})
     monkeypatch.setattr(Tape, "of", lambda function: pytest.fail("derived again"))
-    monkeypatch.setattr(Block, "_function", lambda *inputs: pytest.fail("built again"))
+    monkeypatch.setattr(Expressions, "_function", lambda *inputs: pytest.fail("built again"))
     again = gait_blocks(solver.gait, 3)
     meshes = meshing.first(solver.stride.durations, config.mesh)
-    CollocationProgram(again, solver.prediction, meshes).program.functions()
+    assert CollocationProgram(again, solver.prediction, meshes).functions
     monkeypatch.undo()
     for block, other in zip(first.blocks, again.blocks, strict=True):
-        assert isinstance(block, Block)
-        assert isinstance(other, KeptBlock)
+        assert block.kept is None
+        assert other.kept is not None
         assert (block.name, block.rows, block.matters) == (other.name, other.rows, other.matters)
         for kind in KINDS if block.matters else ():
             assert same(block.tapes[kind], other.tapes[kind])

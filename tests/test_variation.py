@@ -79,5 +79,5 @@ def test_patients_of_one_structure_share_their_blocks() -> None:
     meshes = uniform([1] * 8)
     shared, fresh = (CollocationProgram(b, second.prediction, meshes) for b in (first.blocks, own))
     x = np.random.default_rng(0).normal(0.1, 0.1, shared.layout.size)
-    values = [np.asarray(p.program.functions()["nlp"](x, p.parameters)[1]) for p in (shared, fresh)]
+    values = [np.asarray(p.functions["nlp"](x, p.parameters)[1]) for p in (shared, fresh)]
     assert np.allclose(*values, rtol=1e-12, atol=1e-12)

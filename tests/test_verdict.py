@@ -19,8 +19,8 @@ from pathwalker_cli.patient import load_patient
 from pathwalker_cli.patient.blocks import RealSpring, SpringSet
 from pathwalker_cli.studies.verdict import (
     SHARE,
+    NumberVerdict,
     SnappedSprings,
-    SpringVerdict,
     StopVerdict,
     Verdict,
     _nearest,
@@ -30,24 +30,26 @@ from pathwalker_cli.studies.verdict import (
 )
 from pathwalker_cli.studies.verdict_text import verdict_lines
 
-INSIDE = SpringVerdict(
-    "plantarflexion_stiffness_right", 20.0, (5.0, 92.0), "", 0.0, 1e-4, (15.0, 30.0),
+INSIDE = NumberVerdict(
+    "plantarflexion_stiffness_right", "K_P right", "N m/rad", 20.0,
+    (5.0, 92.0), "", 0.0, 1e-4, (15.0, 30.0),
     (False, False), True,
 )  # fmt: skip
-AT_LIMIT = SpringVerdict(
-    "dorsiflexion_stiffness_left", 92.0, (5.0, 92.0), "upper", -2e-3, 1e-5, (60.0, 92.0),
+AT_LIMIT = NumberVerdict(
+    "dorsiflexion_stiffness_left", "K_D left", "N m/rad", 92.0,
+    (5.0, 92.0), "upper", -2e-3, 1e-5, (60.0, 92.0),
     (False, True), True,
 )  # fmt: skip
-PRESCRIBED = SpringVerdict(
-    "dorsiflexion_stiffness_right", 40.0, (40.0, 40.0), "", 0.0, 0.0, (40.0, 40.0), (True, True),
-    True,
+PRESCRIBED = NumberVerdict(
+    "dorsiflexion_stiffness_right", "K_D right", "N m/rad", 40.0,
+    (40.0, 40.0), "", 0.0, 0.0, (40.0, 40.0), (True, True), True,
 )  # fmt: skip
 OPTIMUM = LocalOptimum(0, "synthetic", "converged", 0.25, 0.64, (40.0, 92.0, 20.0, 6.0), 10, 1.0)
 
 
 def verdict(**changes: object) -> Verdict:
     """Return a verdict."""
-    made = Verdict((INSIDE, AT_LIMIT), (), None, (), 0, 7, 3.0)
+    made = Verdict((INSIDE, AT_LIMIT), (), (), None, (), 0, 7, 3.0)
     return replace(made, **changes)  # type: ignore[arg-type]
 
 
@@ -90,7 +92,7 @@ def test_stiffness_is_told_per_radian_and_per_degree() -> None:
 def test_a_limit_says_what_lies_beyond_it() -> None:
     line = text(verdict())["K_D left"]
     assert "sits at the upper limit: 9.2 N m/rad stiffer would save about 1.8 % more" in line
-    soft = replace(AT_LIMIT, limit="lower", gradient=2e-3, stiffness=5.0, region=(5.0, 9.0))
+    soft = replace(AT_LIMIT, limit="lower", gradient=2e-3, value=5.0, region=(5.0, 9.0))
     line = text(verdict(springs=(soft,)))["K_D left"]
     assert "sits at the lower limit: 0.5 N m/rad softer would save about 0.1 % more" in line
 
@@ -146,7 +148,7 @@ def test_other_optima_are_counted_with_their_springs() -> None:
 
 def test_real_springs_and_their_price() -> None:
     assert "lists none" in text(verdict())["real springs"]
-    name = INSIDE.spring
+    name = INSIDE.name
     snapped = SnappedSprings({name: "flexible"}, {name: 40.1}, 0.012, 0.64, "converged")
     line = text(verdict(snapped=snapped))["real springs"]
     assert line == "K_P right flexible (40.1 N m/rad, 0.70 N m/deg): cost +1.2 %, 0.640 m/s"
@@ -217,7 +219,7 @@ def test_a_real_verdict_encloses_the_identified_springs() -> None:
 
 
 def test_real_springs_that_cost_less_than_the_optimum_are_a_warning() -> None:
-    name = INSIDE.spring
+    name = INSIDE.name
     snapped = SnappedSprings({name: "flexible"}, {name: 40.1}, -0.026, 0.64, "converged")
     line = text(verdict(snapped=snapped))["real springs"]
     assert "WARNING: that is less than the optimum found" in line

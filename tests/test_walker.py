@@ -14,9 +14,9 @@ from pathwalker_cli import build_walker, load_patient
 from pathwalker_cli.conventions import GENERATORS
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.contact import PHASES
-from pathwalker_cli.model.curves import evaluate
-from pathwalker_cli.model.muscle import activation_rate, curves_of, excitation_from_rate
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_curve, orthosis_torque
+from pathwalker_cli.model.elements.curves import evaluate
+from pathwalker_cli.model.elements.muscle import activation_rate, curves_of, excitation_from_rate
+from pathwalker_cli.model.elements.orthosis import OrthosisSide, orthosis_curve, orthosis_torque
 from pathwalker_cli.model.walker import Walker
 from published_rows import ROWS, PublishedRow
 

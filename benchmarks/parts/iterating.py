@@ -61,11 +61,11 @@ def steps(
     config = load_config(problem, changes=(*mesh, f"solver.max_iterations={tracking}"))
     solver = GaitSolver(config)
     tracked, result = solver._track()
-    motion = replace(tracked.to_motion(result.unknowns), parameters=solver.stiffness_guess())
+    motion = replace(tracked.to_motion(result.unknowns), parameters=solver.parameter_guess())
     if variant == "casadi":
         blocks.kernels = lambda: None
     program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)
-    functions = program.program.functions()
+    functions = program.functions
     if variant == "casadi" and type(functions["hess_lag"]) is not ca.Function:
         raise RuntimeError("the program does not ask `blocks.kernels` for tapes any more")
     settings = solver.settings(config.solver.tolerance, config.solver.first_barrier)
@@ -153,14 +153,14 @@ def _functions(program: CollocationProgram, start: np.ndarray) -> dict[str, dict
         "x": start,
         "p": program.parameters,
         "lam_f": np.ones(1),
-        "lam_g": np.ones(program.program.rows),
+        "lam_g": np.ones(program.rows),
     }
     return {
         name: {
             "seconds": _seconds(function, [given[key] for key in FUNCTIONS[name][0]]),
             "instructions": float(_instructions(program, name)),
         }
-        for name, function in program.program.functions().items()
+        for name, function in program.functions.items()
     }
 
 
@@ -187,7 +187,7 @@ def _instructions(program: CollocationProgram, name: str) -> int:
     """Return the instructions that a function of the program runs at all occurrences."""
     kinds = {kind for kind, _ in FUNCTIONS[name][1].values()}
     return sum(
-        o.count * int(getattr(o.block, kind).n_instructions())
-        for o in program.program.occurrences
+        o.count * int(o.block.functions[kind].n_instructions())
+        for o in program.occurrences
         for kind in kinds
     )

@@ -52,7 +52,7 @@ def figures(folder: str) -> dict[str, Any]:
     optimum = resolver.optimum
     return {
         "intervals": optimum.motion.intervals,
-        "unknowns": optimum.program.program.size,
+        "unknowns": optimum.program.size,
         "done": found,
     }
 

@@ -104,7 +104,7 @@ def described(solver: GaitSolver, path: str) -> Checked:
         solver.blocks, solver.prediction, meshing.first(durations, config.mesh)
     )
     intervals = sum(len(mesh) - 1 for mesh in program.meshes)
-    unknowns, rows = program.program.size, program.program.rows
+    unknowns, rows = program.size, program.rows
     seconds = expected(config, intervals)
     weights = _weights(solver)
     names = [phase.name for phase in solver.gait.phases]

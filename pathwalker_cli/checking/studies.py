@@ -51,9 +51,8 @@ def check_sensitivity(path: str, changes: Changes = ()) -> Checked:
     solver = _base(study, path)
     patient, worn = solver.walker.patient, solver.walker.orthosis is not None
     with placed(path):
-        springs = free_springs(_ranges(solver)) if worn else ()
-        places = asked_places(study, springs, patient, worn)
-        for place in places:
+        places = asked_places(study, solver.free, patient, worn)
+        for place in places[len(solver.free) :]:
             _check_place(place, patient)
     solves = 2 * len(study.check)
     what = f"{len(places)} numbers asked about; two solves for each of {len(study.check)} checks"
@@ -61,10 +60,9 @@ def check_sensitivity(path: str, changes: Changes = ()) -> Checked:
 
 
 def _check_place(place: str, patient: Patient) -> None:
-    """Refuse what is neither a spring nor a number of the patient's file."""
+    """Refuse what is no number of the patient's file."""
     try:
-        if place not in STIFFNESSES:
-            varied(patient, Variation(scale={place: 1.0}))
+        varied(patient, Variation(scale={place: 1.0}))
     except ConfigError as error:
         mend = error.mend
         raise ConfigError(error.what, where="places", allowed=error.allowed, mend=mend) from None

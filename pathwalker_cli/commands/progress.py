@@ -14,7 +14,7 @@ from pathwalker_cli.studies.run import RunLog
 
 if TYPE_CHECKING:
     from pathwalker_cli.gait.solution import LocalOptimum
-    from pathwalker_cli.nlp.ipopt import ProgressReport
+    from pathwalker_cli.nlp.watch import ProgressReport
 
 __all__ = ["Progress"]
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
 from pathwalker_cli.config.nested import merged
-from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, Condition
+from pathwalker_cli.conventions import ANGLES, STIFFNESSES, Condition
 from pathwalker_cli.errors import did_you_mean
 from pathwalker_cli.gait.goals import COMFORT_COORDINATES, GOALS, Goals
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
@@ -55,6 +55,8 @@ Durations = Annotated[tuple[Seconds, Seconds], AS_TUPLE, ORDERED]
 StiffnessRange = Annotated[
     tuple[Stiffness, Stiffness], AS_TUPLE, BeforeValidator(_no_number), ORDERED
 ]
+Amount = Annotated[float, Quantity("SI units", -1000.0, 1000.0)]
+AmountRange = Annotated[tuple[Amount, Amount], AS_TUPLE, BeforeValidator(_no_number), ORDERED]
 
 
 def _named(names: Iterable[str], allowed: Collection[str]) -> None:
@@ -151,7 +153,7 @@ class BoundsConfig(YamlModel):
     @field_validator("joint_ranges", "fallback_joint_ranges")
     @classmethod
     def _coordinates(cls, value: dict[str, Range]) -> dict[str, Range]:
-        _named(value, COORDINATES[2:])
+        _named(value, ANGLES)
         return value
 
     @field_validator("phase_durations")
@@ -201,6 +203,7 @@ class StartConfig(YamlModel):
     stride_ratio: Annotated[float, Quantity("leg lengths", 0.3, 3.0)] = 1.1
     walking_speed: Speed | None = None
     stiffness: dict[str, Stiffness] = Field(default_factory=dict)
+    free: dict[str, Amount] = Field(default_factory=dict)
     seed: Annotated[int, Field(ge=0)] = 0
 
     @field_validator("stiffness")
@@ -229,6 +232,7 @@ class StudyConfig(YamlModel):
     problem: str
     patient: str
     variation: Variation = Variation()
+    free: dict[str, AmountRange] = Field(default_factory=dict)
     model: ModelConfig = ModelConfig()
     cost: CostConfig = CostConfig()
     bounds: BoundsConfig = BoundsConfig()

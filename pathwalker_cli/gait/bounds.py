@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from pathwalker_cli.config import BoundsConfig
-from pathwalker_cli.conventions import (
-    CONTACT_FORCES,
-    CONTACT_POINTS,
-    COORDINATES,
-    GRAVITY,
-    ROOT,
-    STIFFNESSES,
-)
+from pathwalker_cli.config import BoundsConfig, StudyConfig
+from pathwalker_cli.conventions import ANGLES, GRAVITY, ROOT
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.problem import ACTIVATIONS, RESERVES, VELOCITIES
-from pathwalker_cli.model.contact import PHASES
+from pathwalker_cli.io.described import quantity_at
+from pathwalker_cli.model.contact import FORCES, PHASES, POINTS
+from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.problem import INFINITY, BoundTable
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient.blocks import orthosis_fault
 
-__all__ = ["GaitBounds", "gait_bounds", "recorded_durations", "tracking_bounds"]
+__all__ = ["GaitBounds", "gait_bounds", "held", "recorded_durations", "tracking_bounds"]
 
 Range = tuple[float, float]
 
@@ -33,13 +32,17 @@ class GaitBounds:
     Args:
         table: All bounds.
         sources: For every choice (name of the quantity) one clause: value and reason.
+        ranges: Range of every unknown of the walker by name [SI].
     """
 
     table: BoundTable
     sources: dict[str, str]
+    ranges: dict[str, Range]
 
 
-def gait_bounds(walker: Walker, config: BoundsConfig) -> GaitBounds:
+def gait_bounds(
+    walker: Walker, config: BoundsConfig, free: Mapping[str, Range] | None = None
+) -> GaitBounds:
     """Return the bounds of a prediction.
 
     Joint ranges default to the barefoot recordings widened by the margin: they are known before
@@ -48,9 +51,10 @@ def gait_bounds(walker: Walker, config: BoundsConfig) -> GaitBounds:
     Args:
         walker: Who walks.
         config: Bounds of the study.
+        free: Range of every number that the config frees, by address [SI].
 
     Raises:
-        ConfigError: If a joint has no range, or stops and springs of a range do not fit.
+        ConfigError: If a joint has no range, or an orthosis within the ranges could not be.
     """
     sources: dict[str, str] = {}
     entries: dict[tuple[str, ...], Range] = _always()
@@ -61,17 +65,18 @@ def gait_bounds(walker: Walker, config: BoundsConfig) -> GaitBounds:
         pair = config.phase_durations.get(phase.name, config.phase_duration)
         entries[("duration", phase.name)] = pair
         sources[f"duration of {phase.name}"] = f"[{pair[0]:g}, {pair[1]:g}] s, from the config"
-    for force in CONTACT_FORCES:
-        if force.endswith("z"):
-            entries[(force,)] = (config.least_vertical_force, INFINITY)
-    for point in CONTACT_POINTS:
-        entries[(f"{point} height",)] = (config.least_height, INFINITY)
+    for force in FORCES:
+        if force.bears:
+            entries[(force.name,)] = (config.least_vertical_force, INFINITY)
+    for point in POINTS:
+        entries[(f"{point.name} height",)] = (config.least_height, INFINITY)
     entries |= _lift_off()
     entries[("distance",)] = config.distance
     entries[("walking_speed",)] = (_least_speed(walker, config, sources), INFINITY)
-    entries |= _stiffness(walker, config, sources)
+    ranges = _unknowns(walker, config, free, sources)
+    entries |= {(name,): pair for name, pair in ranges.items()}
     entries |= {(name,): (0.0, 0.0) for name in RESERVES}
-    return GaitBounds(BoundTable(entries), sources)
+    return GaitBounds(BoundTable(entries), sources, ranges)
 
 
 def recorded_durations(bounds: GaitBounds, durations: np.ndarray) -> GaitBounds:
@@ -79,23 +84,25 @@ def recorded_durations(bounds: GaitBounds, durations: np.ndarray) -> GaitBounds:
     pairs = list(zip(PHASES, durations.tolist(), strict=True))
     table = bounds.table.replace({("duration", phase.name): (d, d) for phase, d in pairs})
     sources = {f"duration of {phase.name}": f"{d:.4g} s, as recorded" for phase, d in pairs}
-    return GaitBounds(table, {**bounds.sources, **sources})
+    return replace(bounds, table=table, sources={**bounds.sources, **sources})
 
 
-def tracking_bounds(bounds: GaitBounds, durations: np.ndarray, stiffness: np.ndarray) -> BoundTable:
-    """Return the bounds of the first stage: given durations and stiffness, free reserves.
+def tracking_bounds(
+    bounds: GaitBounds, durations: np.ndarray, held: Mapping[str, float]
+) -> BoundTable:
+    """Return the bounds of the first stage: given durations and parameters, free reserves.
 
     Args:
         bounds: Bounds of the prediction.
         durations: Phase durations [s], shape (8,).
-        stiffness: Stiffness to hold [N m/rad], shape (4,), or empty.
+        held: Value of every unknown of the walker by name [SI].
     """
     changes: dict[tuple[str, ...], Range] = {(name,): (-INFINITY, INFINITY) for name in RESERVES}
-    changes |= {(name,): (-2.5, 2.5) for name in COORDINATES[2:]}
+    changes |= {(name,): (-2.5, 2.5) for name in ANGLES}
     changes[("walking_speed",)] = (-INFINITY, INFINITY)
     for phase, duration in zip(PHASES, durations, strict=True):
         changes[("duration", phase.name)] = (float(duration), float(duration))
-    for name, value in zip(STIFFNESSES, stiffness, strict=False):
+    for name, value in held.items():
         changes[(name,)] = (float(value), float(value))
     return bounds.table.replace(changes)
 
@@ -110,6 +117,26 @@ def helped_bounds(bounds: GaitBounds) -> BoundTable:
     return bounds.table.replace(free)
 
 
+def held(config: StudyConfig, values: Mapping[Unknown, float]) -> dict[str, Any]:
+    """Return config values by dotted key with which unknowns are held.
+
+    What the config frees by its place is held there, springs by their own key: the structure of
+    the problem stays, so that neighbours start warm.
+
+    Args:
+        config: The config of the problem.
+        values: Value of every unknown to hold [its unit].
+    """
+    free: dict[str, Any] = dict(config.free)
+    springs: dict[str, Any] = dict(config.bounds.stiffness)
+    for unknown, value in values.items():
+        if unknown.address in free:
+            free[unknown.address] = (value, value)
+        else:
+            springs[unknown.name] = (value, value)
+    return {"free": free, "bounds.stiffness": springs}
+
+
 def _always() -> dict[tuple[str, ...], Range]:
     """Return bounds that are no choice: where the walk starts, what can not be negative."""
     entries: dict[tuple[str, ...], Range] = {("pelvis_tx", "first"): (0.0, 0.0)}
@@ -122,7 +149,7 @@ def _lift_off() -> dict[tuple[str, ...], Range]:
     """Return zero force at the last instant before a point leaves the ground."""
     following = PHASES[1:] + PHASES[:1]
     return {
-        (force, phase.name, "end"): (0.0, 0.0)
+        (force.name, phase.name, "end"): (0.0, 0.0)
         for phase, after in zip(PHASES, following, strict=True)
         for force in phase.lifted_off(after)
     }
@@ -134,7 +161,7 @@ def _joint_ranges(
     recorded = walker.patient.recorded.get("barefoot")
     margin = config.joint_range_margin
     entries: dict[tuple[str, ...], Range] = {}
-    for name in COORDINATES[2:]:
+    for name in walker.skeleton.angles:
         if name in config.joint_ranges:
             low, high = config.joint_ranges[name]
             source = "from the config"
@@ -170,23 +197,70 @@ def _least_speed(walker: Walker, config: BoundsConfig, sources: dict[str, str]) 
     return speed
 
 
-def _stiffness(
-    walker: Walker, config: BoundsConfig, sources: dict[str, str]
-) -> dict[tuple[str, ...], Range]:
-    if walker.orthosis is None:
-        return {}
-    orthosis = walker.patient.require_orthosis()
-    real = orthosis.stiffness_range
-    entries: dict[tuple[str, ...], Range] = {}
-    for name in STIFFNESSES:
-        kind = name.split("_")[0]
-        given = config.stiffness.get(name) or getattr(config, f"{kind}_stiffness")
-        pair = given or getattr(real, kind)
-        fault = orthosis.spring_fault(kind, *pair)
-        if fault is not None:
-            key = f"stiffness.{name}" if name in config.stiffness else f"{kind}_stiffness"
-            raise ConfigError(f"is {fault[0]}", where=f"bounds.{key}", allowed=fault[1])
-        entries[(name,)] = pair
-        reason = "from the config" if given else f"real springs: {real.source}"
-        sources[name] = f"[{pair[0]:g}, {pair[1]:g}] N m/rad, {reason}"
+def _unknowns(
+    walker: Walker, config: BoundsConfig, free: Mapping[str, Range] | None, sources: dict[str, str]
+) -> dict[str, Range]:
+    """Return the ranges of the walker's unknowns by name: as freed, else of the springs."""
+    ranges = dict(free or {})
+    entries: dict[str, Range] = {}
+    keys: dict[str, str] = {}
+    for unknown in walker.unknowns:
+        if unknown.address in ranges:
+            pair, reason = ranges[unknown.address], "from the config"
+            keys[unknown.name] = f"free.{unknown.address}"
+            _check_range(unknown, pair)
+        else:
+            pair, reason, keys[unknown.name] = _spring_range(walker, config, unknown)
+        entries[unknown.name] = pair
+        sources[unknown.name] = f"[{pair[0]:g}, {pair[1]:g}] {unknown.unit}, {reason}"
+    _check_orthosis(walker, entries, keys)
     return entries
+
+
+def _check_range(unknown: Unknown, pair: Range) -> None:
+    """Refuse a range whose ends the patient's file would not take."""
+    quantity = quantity_at(Patient, unknown.numbers[0].place)
+    for value in pair:
+        if not quantity.lower <= value <= quantity.upper:
+            raise ConfigError(
+                f"reaches {value:g} {quantity.unit}",
+                where=f"free.{unknown.address}",
+                allowed=quantity.allowed,
+                mend=quantity.below if value < quantity.lower else quantity.above,
+            )
+
+
+def _spring_range(walker: Walker, config: BoundsConfig, unknown: Unknown) -> tuple[Range, str, str]:
+    """Return range, reason and key of a spring that the config does not free by its address."""
+    real = walker.patient.require_orthosis().stiffness_range
+    kind = unknown.numbers[0].name
+    given = config.stiffness.get(unknown.name) or getattr(config, kind)
+    key = f"bounds.stiffness.{unknown.name}" if unknown.name in config.stiffness else kind
+    pair = given or getattr(real, kind.removesuffix("_stiffness"))
+    return pair, "from the config" if given else f"real springs: {real.source}", f"bounds.{key}"
+
+
+def _check_orthosis(walker: Walker, ranges: Mapping[str, Range], keys: Mapping[str, str]) -> None:
+    """Refuse ranges within which an orthosis has no exact torque curve.
+
+    Raises:
+        ConfigError: If stops, free play and springs of the ranges do not fit everywhere.
+    """
+    if not walker.device.worn:
+        return
+    chosen = {a: u for u in walker.unknowns for a in u.addresses}
+    for element in walker.device.elements.values():
+        values = {
+            number.name: ranges[chosen[number.address].name]
+            if number.address in chosen
+            else (walker.values[number.address],) * 2
+            for number in element.numbers
+        }
+        fault = orthosis_fault(values, element.side)
+        if fault is not None:
+            free = {
+                n.name: keys[chosen[n.address].name] for n in element.numbers if n.address in chosen
+            }
+            where = next((free[name] for name in fault.numbers if name in free), "orthosis")
+            what = f"is {fault.what}" if fault.spring else f"leaves room for {fault.what}"
+            raise ConfigError(what, where=where, allowed=fault.allowed)

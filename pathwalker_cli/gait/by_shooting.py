@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import Any, cast
 
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.cost_terms import prediction_terms
@@ -13,7 +12,8 @@ from pathwalker_cli.gait.solution import GaitSolution, StageRecord
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.gait.symmetry import full_stride
 from pathwalker_cli.ocp.phased import PhasedMotion
-from pathwalker_cli.stride.verify import active_bounds, reintegrate
+from pathwalker_cli.ocp.violations import active_bounds
+from pathwalker_cli.stride.verify import reintegrate
 
 __all__ = ["solve_by_shooting"]
 
@@ -82,7 +82,7 @@ def _solution(
         cost=shooting.cost,
         cost_terms=prediction_terms(motion, costs, solver.gait.goals, solver.weights),
         violations=shooting.violations,
-        active=active_bounds(cast(Any, shooting.program), shooting.nlp),
+        active=active_bounds(shooting.program, shooting.nlp),
         reintegration=errors,
         start=f"collocation from {collocation.start}, cost {collocation.cost:.6g}",
         stages=collocation.stages + stages,

@@ -13,12 +13,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES
+from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, SUFFIX
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 
 __all__ = ["COMFORT_COORDINATES", "GOALS", "Goal", "GoalPoint", "GoalTotals", "Goals"]
 
-COMFORT_COORDINATES: Final = COORDINATES[2:]
+COMFORT_COORDINATES: Final = ANGLES
 """Coordinates that may have a comfortable range: all but the position of the pelvis."""
 
 _PEAK_POWER: Final = 8
@@ -72,9 +72,9 @@ class GoalPoint:
             force: Contact forces of the phase in the order of `phase.forces`.
             data: Numbers of the goal.
         """
-        vertical = {name[:-2]: force[i] for i, name in enumerate(phase.forces) if name[-1] == "z"}
+        vertical = {f.point.name: force[i] for i, f in enumerate(phase.forces) if f.bears}
         everywhere = {point: vertical.get(point, 0.0) for point in CONTACT_POINTS}
-        stance = tuple(sorted({point[-1] for point in phase.points}))
+        stance = tuple(sorted(SUFFIX[side] for side in phase.feet))
         first = PHASES.index(phase) < len(PHASES) // 2
         return GoalPoint(q, v, activation, everywhere, stance, first, data)
 

@@ -1,4 +1,4 @@
-"""Derivatives of an optimum in physical terms: of its cost, its motion and its stiffnesses."""
+"""Derivatives of an optimum in physical terms: of its cost, its motion and its free numbers."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pathwalker_cli.config import StudyConfig, with_values
-from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.resolve import Optimum, Resolver
+from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.kkt import Answer, KktSystem
 
 __all__ = ["Derivative", "Neighbourhood"]
@@ -38,7 +38,7 @@ class Derivative:
 
 
 class Neighbourhood:
-    """What surrounds an optimum to first order, and the cost to second order in the springs.
+    """What surrounds an optimum to first order, and the cost to second order in its unknowns.
 
     Args:
         resolver: The solver whose optimum it is; the tighter its tolerance, the better.
@@ -54,47 +54,61 @@ class Neighbourhood:
         return self.optimum.kkt
 
     @property
-    def springs(self) -> tuple[str, ...]:
-        """Names of the stiffnesses that the problem is free to choose."""
-        places = list(self.optimum.program.layout.parameters)
-        return tuple(STIFFNESSES[places.index(place)] for place in self.kkt.free)
+    def free(self) -> tuple[Unknown, ...]:
+        """The unknowns that the problem is free to choose."""
+        return self.optimum.free
 
     @cached_property
     def _scale(self) -> np.ndarray:
-        """Stiffness [N m/rad] per solver unit of every free spring."""
-        return np.asarray(self.optimum.program.layout.scale[self.kkt.free])
+        """Size of a solver unit of every free unknown."""
+        return np.asarray(self.optimum.program.scale[self.kkt.free])
 
     @cached_property
     def cost_gradient(self) -> np.ndarray:
-        """Derivatives of the cost in the free springs [1/(N m/rad)]; 0 inside their limits."""
+        """Derivatives of the cost in the free unknowns [1/unit]; 0 inside their limits."""
         return np.asarray(self.kkt.parameter_gradient / self._scale)
 
     @cached_property
     def cost_hessian(self) -> np.ndarray:
-        """Second derivatives of the cost in the free springs [1/(N m/rad)^2]."""
+        """Second derivatives of the cost in the free unknowns [1/(unit unit)]."""
         return np.asarray(self.kkt.parameter_hessian / np.outer(self._scale, self._scale))
 
-    def curvature(self, spring: str) -> float:
-        """Return the second derivative of the cost in one stiffness while the others follow.
+    def rise(self, changes: Mapping[Unknown, float]) -> float:
+        """Return the rise of the cost to second order if unknowns move while the others follow.
 
         Args:
-            spring: Name of the spring.
+            changes: By how much every moved unknown differs from the optimum [its unit].
+        """
+        moved = [self.free.index(unknown) for unknown in changes]
+        rest = [i for i in range(len(self.free)) if i not in moved]
+        step, hessian = np.array(list(changes.values())), self.cost_hessian
+        bend = hessian[np.ix_(moved, moved)]
+        if rest:
+            cross = hessian[np.ix_(moved, rest)]
+            bend = bend - cross @ np.linalg.lstsq(hessian[np.ix_(rest, rest)], cross.T)[0]
+        return float(self.cost_gradient[moved] @ step + step @ bend @ step / 2.0)
+
+    def curvature(self, unknown: Unknown) -> float:
+        """Return the second derivative of the cost in one unknown while the others follow.
+
+        Args:
+            unknown: One of `free`.
 
         Returns:
-            The derivative [1/(N m/rad)^2].
+            The derivative [1/unit^2].
         """
-        which = self.springs.index(spring)
+        which = self.free.index(unknown)
         return self.kkt.curvature(which) / float(self._scale[which]) ** 2
 
-    def by_spring(self, spring: str) -> Derivative:
-        """Return the derivatives by one stiffness [N m/rad] while the others follow."""
-        which = self.springs.index(spring)
+    def by_unknown(self, unknown: Unknown) -> Derivative:
+        """Return the derivatives by one unknown [its unit] while the others follow."""
+        which = self.free.index(unknown)
         held = self.kkt.held(which)
-        step = _STEP * float(self.optimum.stiffness[STIFFNESSES.index(spring)])
+        step = _STEP * max(abs(self.optimum.value(unknown)), 0.01 * unknown.scale)
         return self._derivative(held, 1.0 / self._scale[which], step, {})
 
     def by_factor(self, place: str) -> Derivative:
-        """Return the derivatives by a factor on a place in the patient's file, the springs follow.
+        """Return the derivatives by a factor on a place in the patient's file, the unknowns follow.
 
         Args:
             place: The place; what the config scales there already is scaled on.

@@ -8,29 +8,25 @@ controls their rates.  For fixed a, equation (2) increases strictly in the excit
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
-from typing import Final, Literal
+from functools import cached_property
+from typing import Final, Literal, cast
 
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.conventions import (
-    CONTACT_FORCES,
-    CONTACT_POINTS,
-    COORDINATES,
-    GENERATORS,
-    SIDES,
-    STIFFNESSES,
-)
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
 from pathwalker_cli.gait.boundary import gait_boundary
 from pathwalker_cli.gait.goals import Goals
-from pathwalker_cli.model.contact import PHASES, ContactPhase
-from pathwalker_cli.model.curves import BezierChain, evaluate
-from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME, excitation_from_rate
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
-from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
+from pathwalker_cli.model.contact import FORCES, PHASES, ContactForce, ContactPhase
+from pathwalker_cli.model.elements import element_forces, generalised_forces
+from pathwalker_cli.model.elements.muscle import (
+    ACTIVATION_TIME,
+    DEACTIVATION_TIME,
+    excitation_from_rate,
+)
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.frozen import FrozenTerms
 from pathwalker_cli.ocp.problem import (
     INFINITY,
@@ -44,7 +40,6 @@ from pathwalker_cli.ocp.problem import (
 __all__ = [
     "EXCITATION",
     "INTEGRALS",
-    "STIFFNESSES",
     "WEIGHTS",
     "Form",
     "GaitProblem",
@@ -68,7 +63,7 @@ that need not be periodic."""
 
 # What counts as 1 for the solver; with these the prototypes needed the fewest iterations.
 _VELOCITY, _ACCELERATION, _FORCE, _TORQUE = 5.0, 50.0, 100.0, 20.0
-_RATE, _STIFFNESS, _HEIGHT = 20.0, 50.0, 0.1
+_RATE, _HEIGHT = 20.0, 0.1
 
 
 @dataclass(frozen=True)
@@ -124,73 +119,77 @@ class _Constants:
     def __init__(self, walker: Walker, goals: Goals) -> None:
         body = walker.rigid_body
         self.theta = ca.SX.sym("theta", len(body.parameter_names))
-        self.strength = ca.SX.sym("strength", len(GENERATORS))
+        self.numbers = {number.address: ca.SX.sym(number.full_name) for number in walker.numbers}
         self.friction = ca.SX.sym("friction")
         self.weights = ca.SX.sym("weights", len(WEIGHTS) + len(goals.names))
         self.goal_numbers = ca.SX.sym("goal_numbers", goals.size)
-        self._sides = [] if walker.orthosis is None else [ca.SX.sym(s, 7) for s in SIDES]
+        free = [unknown for unknown in walker.unknowns if walker.moves_bodies(unknown)]
+        self.slopes = {u.name: ca.SX.sym(f"{u.name}_slope", self.theta.numel()) for u in free}
 
     @property
     def vector(self) -> ca.SX:
         """All constants, one after the other."""
         return ca.vertcat(
             self.theta,
-            self.strength,
+            *self.numbers.values(),
             self.friction,
             self.weights,
-            *self._sides,
             self.goal_numbers,
+            *self.slopes.values(),
         )
 
-    @property
-    def sides(self) -> tuple[OrthosisSide, ...]:
-        """Symbolic orthosis parameters right and left, or none."""
-        return tuple(OrthosisSide(*ca.vertsplit(side)) for side in self._sides)
-
-    @staticmethod
     def values(
+        self,
         walker: Walker,
         goals: Goals,
         weights: GaitWeights,
         friction: float,
-        orthosis_share: float,
+        share: float,
     ) -> np.ndarray:
-        """Return the values in the order of `vector`."""
-        sides = [side.scaled(orthosis_share) for side in walker.orthosis or ()]
+        """Return the values in the order of `vector`; of what is faded only a share acts."""
+        numbers = [
+            walker.values[number.address] * (share if number.faded else 1.0)
+            for number in walker.numbers
+        ]
+        free = {unknown.name: unknown for unknown in walker.unknowns}
         return np.concatenate(
             [
                 walker.rigid_body.parameters,
-                walker.max_isometric_torque,
+                numbers,
                 [friction],
                 weights.vector(goals.names),
-                *(list(vars(side).values()) for side in sides),
                 goals.numbers(walker.weight),
+                *(walker.body_slopes(free[name]) for name in self.slopes),
             ]
         )
 
 
-def _curve_expansion(chain: BezierChain, sign: float, x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return value, slope and curvature of a curve of sign * x."""
-    point = evaluate(chain, sign * x)
-    return point.value, sign * point.slope, point.curvature
+def _expansion(
+    function: Callable[..., ca.SX], arguments: Sequence[ca.SX], moving: Sequence[int]
+) -> Callable[..., tuple[ca.SX, ca.SX, ca.SX]]:
+    """Return what gives value, gradient and Hessian of a function in some of its arguments."""
+    if hasattr(function, "expansion") and len(arguments) == 1:
+        return cast("Callable[..., tuple[ca.SX, ca.SX, ca.SX]]", function.expansion)
+    fixed = [i for i in range(len(arguments)) if i not in moving]
 
+    def expanded(*at: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+        x, rest = ca.SX.sym("x", len(moving)), ca.SX.sym("rest", len(fixed))
+        places = {**dict(zip(moving, ca.vertsplit(x), strict=True)),
+                  **dict(zip(fixed, ca.vertsplit(rest), strict=True))}  # fmt: skip
+        value = function(*(places[i] for i in range(len(arguments))))
+        hessian, gradient = ca.hessian(value, x)
+        terms = ca.Function("expansion", [x, rest], [value, gradient, hessian])
+        result = terms(ca.vertcat(*at), ca.vertcat(*(arguments[i] for i in fixed)))
+        return result[0], result[1], result[2]
 
-def _orthosis_expansion(side: OrthosisSide, *arguments: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return orthosis torque, its gradient and its Hessian in angle, K_D and K_P."""
-    x = ca.SX.sym("x", 3)
-    parameters = ca.vertcat(*vars(side).values())
-    torque = orthosis_torque(side, *ca.vertsplit(x))
-    hessian, gradient = ca.hessian(torque, x)
-    terms = ca.Function("orthosis", [x, parameters], [torque, gradient, hessian])
-    value, slope, bend = terms(ca.vertcat(*arguments), parameters)
-    return value, slope, bend
+    return expanded
 
 
 class GaitProblem:
     """Builds the `MultiPhaseProblem` of a walker.
 
     Args:
-        walker: The walker; its condition decides whether there are stiffnesses to find.
+        walker: The walker; its unknowns are the free parameters.
         form: What the phases are.
         goals: Clinical goals, and the power of the effort.
     """
@@ -207,16 +206,18 @@ class GaitProblem:
         self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
         self.activations = Variables.make("a", ACTIVATIONS, 1.0)
         self.rates = Variables.make("rate", RATES, _RATE)
-        names = STIFFNESSES if walker.orthosis else ()
-        self.stiffness = Variables.make("stiffness", names, _STIFFNESS)
+        names = tuple(unknown.name for unknown in walker.unknowns)
+        sizes = np.array([unknown.scale for unknown in walker.unknowns])
+        self.parameters = Variables.make("parameters", names, sizes)
         self.reference = ca.SX.sym("q_ref", len(COORDINATES))
 
     @property
     def structure(self) -> Hashable:
         """What the expressions depend on; problems of equal structure differ in numbers only."""
         body = self.walker.rigid_body
-        names, worn = tuple(body.parameter_names), self.walker.orthosis is not None
-        return self.form, body.backend, body.topology, names, worn, self.goals.structure
+        names, free = tuple(body.parameter_names), self.walker.unknowns
+        parts = tuple((type(e).__name__, e.name) for e in self.walker.elements)
+        return self.form, body.backend, body.topology, names, parts, free, self.goals.structure
 
     @property
     def q(self) -> ca.SX:
@@ -235,7 +236,7 @@ class GaitProblem:
             states=self.states,
             smooth=self.activations,
             controls=self.rates,
-            parameters=self.stiffness,
+            parameters=self.parameters,
             shared=self.constants.vector,
             point_data=self.reference,
             integrals=self.integrals,
@@ -259,24 +260,44 @@ class GaitProblem:
         return self.constants.values(self.walker, self.goals, weights, friction, orthosis_share)
 
     @cached_property
+    def _numbers(self) -> dict[str, ca.SX]:
+        """Every named number by address: an unknown, or a constant."""
+        chosen = zip(self.walker.unknowns, ca.vertsplit(self.parameters.symbol), strict=True)
+        free = {address: symbol for unknown, symbol in chosen for address in unknown.addresses}
+        return {**self.constants.numbers, **free}
+
+    @cached_property
+    def _theta(self) -> ca.SX:
+        """Numbers of the rigid bodies, shifted by the unknowns that they depend on."""
+        theta = self.constants.theta
+        for unknown, symbol in zip(
+            self.walker.unknowns, ca.vertsplit(self.parameters.symbol), strict=True
+        ):
+            if unknown.name in self.constants.slopes:
+                home = self.constants.numbers[unknown.addresses[0]]
+                theta = theta + self.constants.slopes[unknown.name] * (symbol - home)
+        return theta
+
+    @cached_property
     def _torques(self) -> tuple[ca.SX, FrozenTerms]:
-        """Generalised forces of muscles and orthoses (10,) [N m], with frozen curves."""
-        tau, frozen = ca.SX(len(COORDINATES), 1), FrozenTerms()
-        for i, (g, row) in enumerate(zip(self.walker.generators, GENERATOR_ROWS, strict=True)):
-            angle = partial(_curve_expansion, g.curves.active_torque_angle, g.angle_sign)
-            speed = partial(_curve_expansion, g.curves.torque_angular_velocity, g.torque_sign)
-            factor = frozen.taylor(angle, self.q[row]) * frozen.taylor(speed, self.v[row])
-            peak = g.torque_sign * self.constants.strength[i]
-            tau[row] += peak * self.activations.symbol[i] * factor
-        for i, (side, row) in enumerate(zip(self.constants.sides, ANKLES, strict=False)):
-            springs = self.stiffness.symbol[i], self.stiffness.symbol[i + 2]
-            expansion = partial(_orthosis_expansion, side)
-            tau[row] += frozen.taylor(expansion, self.q[row], *springs)
-        return tau, frozen
+        """Generalised forces of all elements (10,) [N, N m], with frozen curves."""
+        frozen, walker = FrozenTerms(), self.walker
+        moving = ca.vertcat(self.states.symbol, self.activations.symbol, self.parameters.symbol)
+
+        def curve(function: Callable[..., ca.SX], *arguments: ca.SX) -> ca.SX:
+            varying = [i for i, x in enumerate(arguments) if ca.depends_on(ca.SX(x), moving)]
+            expansion = _expansion(function, arguments, varying)
+            return frozen.taylor(expansion, *(arguments[i] for i in varying))
+
+        state = walker.state(*map(ca.vertsplit, (self.q, self.v, self.activations.symbol)))
+        forces = element_forces(walker.elements, state, self._numbers, curve)
+        names = walker.skeleton.coordinates
+        total = generalised_forces(walker.elements, forces, names, ca.SX(1, 1))
+        return ca.vertcat(*total), frozen
 
     def _phase(self, contact: ContactPhase, following: ContactPhase) -> Phase:
-        body, theta = self.walker.rigid_body, self.constants.theta
-        names = ACCELERATIONS + contact.forces + RESERVES
+        body, theta = self.walker.rigid_body, self._theta
+        names = ACCELERATIONS + contact.force_names + RESERVES
         counts = [len(ACCELERATIONS), len(contact.forces), len(RESERVES)]
         scale = np.repeat([_ACCELERATION, _FORCE, _TORQUE], counts)
         z = Variables.make("z", names, scale)
@@ -291,7 +312,7 @@ class GaitProblem:
             Rows.make(balance, tuple(f"{n} equation of motion" for n in COORDINATES), _TORQUE),
             Rows.make(
                 motion["acceleration"][active],
-                tuple(f"{n} contact acceleration" for n in contact.forces),
+                tuple(f"{n} contact acceleration" for n in contact.force_names),
                 _TORQUE,
             ),
         )
@@ -309,7 +330,7 @@ class GaitProblem:
 
     def _point_motion(self, vdot: ca.SX) -> dict[str, ca.SX]:
         """Return positions, velocities and accelerations of the contact points, (8,) each."""
-        body, theta = self.walker.rigid_body, self.constants.theta
+        body, theta = self.walker.rigid_body, self._theta
         return {
             "position": body.point_positions(self.q, theta),
             "velocity": body.point_velocities(self.q, self.v, theta),
@@ -342,43 +363,46 @@ class GaitProblem:
 
     def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
         """Return heights of the points in the air and the friction cones of the loaded feet."""
-        airborne = [p for p in CONTACT_POINTS if p not in contact.points]
-        heights = [position[CONTACT_FORCES.index(f"{p}_z")] for p in airborne]
+        heights = [f for f in FORCES if f.bears and f.point not in contact.points]
         rows = [
             Rows.make(
-                ca.vertcat(*heights), tuple(f"{p} height" for p in airborne), _HEIGHT, 0.0, INFINITY
+                position[[FORCES.index(f) for f in heights]],
+                tuple(f"{f.point.name} height" for f in heights),
+                _HEIGHT,
+                0.0,
+                INFINITY,
             )
         ]
-        for side in sorted({point[-1] for point in contact.points}):
-            parts = [(n, force[i]) for i, n in enumerate(contact.forces) if n[-3] == side]
-            normal = sum(f for n, f in parts if n.endswith("z"))
-            tangent = sum(f for n, f in parts if n.endswith("x"))
+        for side in sorted(contact.feet):
+            parts = [(f, force[i]) for i, f in enumerate(contact.forces) if f.point.side == side]
+            normal = sum(value for f, value in parts if f.bears)
+            tangent = sum(value for f, value in parts if not f.bears)
             cone = self.constants.friction * normal
-            names = (f"foot_{side} forward friction", f"foot_{side} backward friction")
             value = ca.vertcat(cone - tangent, cone + tangent)
-            rows.append(Rows.make(value, names, _FORCE, 0.0, INFINITY))
+            rows.append(Rows.make(value, _friction_names(side), _FORCE, 0.0, INFINITY))
         return Rows.join(*rows)
 
-    def _touch_down(self, directions: tuple[str, ...], motion: Mapping[str, ca.SX]) -> Rows:
+    def _touch_down(self, directions: Sequence[ContactForce], motion: Mapping[str, ca.SX]) -> Rows:
         """Return the rows that let new points meet the ground without impact and without force.
 
         Zero acceleration of a new point just before contact is the same as zero force just after.
         """
-        index = [CONTACT_FORCES.index(n) for n in directions]
-        vertical = [n for n in directions if n.endswith("z")]
-        lifts = [CONTACT_FORCES.index(n) for n in vertical]
+        lifts = [f for f in directions if f.bears]
+        index = [FORCES.index(f) for f in directions]
         return Rows.join(
             Rows.make(
-                motion["position"][lifts], tuple(f"{n[:-2]} touch-down" for n in vertical), _HEIGHT
+                motion["position"][[FORCES.index(f) for f in lifts]],
+                tuple(f"{f.point.name} touch-down" for f in lifts),
+                _HEIGHT,
             ),
             Rows.make(
                 motion["velocity"][index],
-                tuple(f"{n} touch-down velocity" for n in directions),
+                tuple(f"{f.name} touch-down velocity" for f in directions),
                 1.0,
             ),
             Rows.make(
                 motion["acceleration"][index],
-                tuple(f"{n} touch-down force" for n in directions),
+                tuple(f"{f.name} touch-down force" for f in directions),
                 _TORQUE,
             ),
         )
@@ -386,11 +410,11 @@ class GaitProblem:
     @staticmethod
     def _fixed_at_end(contact: ContactPhase, following: ContactPhase) -> tuple[str, ...]:
         """Return the path rows that touch-down or lift-off already fix at the end of a phase."""
-        landing = {n[:-2] for n in contact.touched_down(following)}
-        leaving = {p[-1] for p in contact.points} - {p[-1] for p in following.points}
+        landing = dict.fromkeys(f.point.name for f in contact.touched_down(following))
+        leaving = [side for side in contact.feet if side not in following.feet]
         return (
-            *(f"{p} height" for p in landing),
-            *(f"foot_{s} {d} friction" for s in leaving for d in ("forward", "backward")),
+            *(f"{point} height" for point in landing),
+            *(name for side in leaving for name in _friction_names(side)),
         )
 
     def _excitation_rows(self) -> Rows:
@@ -418,7 +442,7 @@ class GaitProblem:
         weights = dict(zip(names, ca.vertsplit(self.constants.weights), strict=True))
         return gait_boundary(
             (self.states, self.activations, self.rates),
-            self.stiffness,
+            self.parameters,
             self.integrals,
             weights,
             self.goals,
@@ -430,16 +454,21 @@ class GaitProblem:
     def _standing(self) -> Rows:
         """Return the rows that let the first phase begin on the ground and at rest there."""
         contact, motion = self.phases[0], self._point_motion(ca.SX.zeros(len(COORDINATES)))
-        vertical = [n for n in contact.forces if n.endswith("z")]
+        vertical = [f for f in contact.forces if f.bears]
         return Rows.join(
             Rows.make(
-                motion["position"][[CONTACT_FORCES.index(n) for n in vertical]],
-                tuple(f"{n[:-2]} height at the start" for n in vertical),
+                motion["position"][[FORCES.index(f) for f in vertical]],
+                tuple(f"{f.point.name} height at the start" for f in vertical),
                 _HEIGHT,
             ),
             Rows.make(
                 motion["velocity"][list(contact.indices)],
-                tuple(f"{n} velocity at the start" for n in contact.forces),
+                tuple(f"{n} velocity at the start" for n in contact.force_names),
                 1.0,
             ),
         )
+
+
+def _friction_names(side: Side) -> tuple[str, str]:
+    foot = f"foot_{SUFFIX[side]}"
+    return f"{foot} forward friction", f"{foot} backward friction"

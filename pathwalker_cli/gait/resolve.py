@@ -12,6 +12,8 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.gait.symmetry import full_stride
+from pathwalker_cli.model.numbers import Unknown
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult, NlpSolver, warm_pushes
 from pathwalker_cli.nlp.kkt import KktSystem
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -91,9 +93,27 @@ class Optimum:
         return full_stride(motion) if self.config.half_cycle else motion
 
     @property
+    def walker(self) -> Walker:
+        """Who walks, with the numbers that were found."""
+        return self.solver.walker.with_parameters(self.motion.parameters)
+
+    @property
     def stiffness(self) -> np.ndarray:
         """K_D right, left, K_P right, left [N m/rad], shape (4,); empty when barefoot."""
-        return self.motion.parameters
+        return self.walker.stiffness
+
+    @property
+    def free(self) -> tuple[Unknown, ...]:
+        """The unknowns that may move within their ranges."""
+        return self.solver.free
+
+    def value(self, unknown: Unknown) -> float:
+        """Return the value of an unknown [its unit]."""
+        return float(self.motion.parameters[self.solver.walker.unknowns.index(unknown)])
+
+    def range(self, unknown: Unknown) -> tuple[float, float]:
+        """Return the allowed range of an unknown [its unit]."""
+        return self.solver.bounds.ranges[unknown.name]
 
     @cached_property
     def series(self) -> GaitSeries:
@@ -140,7 +160,7 @@ class Resolver:
         self._program = self._program_of(self._solver)
         self._warm_solvers: dict[WarmStart, NlpSolver] = {}
         self._multipliers = multipliers
-        if multipliers is not None and multipliers.rows.size != self._program.program.rows:
+        if multipliers is not None and multipliers.rows.size != self._program.rows:
             self._multipliers = None
 
     @classmethod
@@ -211,9 +231,8 @@ class Resolver:
 
 def warm_start_for(program: CollocationProgram, start: np.ndarray) -> WarmStart:
     """Return how to begin with this start: by how much it misses rows and bounds."""
-    nlp = program.program
-    (_, rows) = nlp.functions()["nlp"](start, program.parameters)
-    missed = _outside(np.asarray(rows).ravel(), nlp.lower, nlp.upper)
+    (_, rows) = program.functions["nlp"](start, program.parameters)
+    missed = _outside(np.asarray(rows).ravel(), *program.row_bounds)
     rms = float(np.sqrt(np.mean(missed**2)))
     beyond = float(_outside(start, *program.bounds).max())
     if rms > _FURTHER_ROWS:

@@ -5,21 +5,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 
 from pathwalker_cli.conventions import GENERATORS
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.gait.problem import GaitProblem
-from pathwalker_cli.model.muscle import ACTIVATION_TIME, DEACTIVATION_TIME, excitation_from_rate
-from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
+from pathwalker_cli.model.elements.muscle import (
+    ACTIVATION_TIME,
+    DEACTIVATION_TIME,
+    excitation_from_rate,
+)
+from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
+from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import ProblemNumbers, Variables
 from pathwalker_cli.ocp.shooting import ShootingProgram
 from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks, ShootingProblem
 from pathwalker_cli.ocp.shooting_motion import Shooter, ShootingNodes
-from pathwalker_cli.stride.verify import Violation, largest_violations
+from pathwalker_cli.ocp.violations import Violation, largest_violations
 
 __all__ = [
     "EXCITATIONS",
@@ -140,11 +145,6 @@ class ShootingSolution:
         return self.nodes.durations
 
     @property
-    def parameters(self) -> np.ndarray:
-        """Free parameters."""
-        return self.nodes.parameters
-
-    @property
     def distance(self) -> float:
         """Distance of the motion [m]."""
         return float(self.nodes.states[-1][-1, 0] - self.nodes.states[0][0, 0])
@@ -153,11 +153,6 @@ class ShootingSolution:
     def walking_speed(self) -> float:
         """Mean speed [m/s]."""
         return self.distance / float(self.durations.sum())
-
-    @property
-    def iterations(self) -> int:
-        """Iterations over all rounds."""
-        return sum(each.iterations for each in self.rounds)
 
     @property
     def seconds(self) -> float:
@@ -277,9 +272,8 @@ class _Search:
         )
         name = f"rounding {rounding:g}"
         watch = None if self.observer is None else _named(self.observer, name)
-        # the program offers all that a solve looks at
         self.result = solve_program(
-            cast(Any, self.program),
+            self.program,
             self.program.from_nodes(self.nodes),
             self._ipopt(),
             observer=watch,
@@ -290,7 +284,7 @@ class _Search:
                 rounding,
                 self.result.status,
                 sum(len(ends) - 1 for intervals in edges for ends in intervals),
-                self.program.program.size,
+                self.program.size,
                 self.result.iterations,
                 self.result.seconds,
                 self.result.seconds_functions,
@@ -335,7 +329,7 @@ class _Search:
             motion=shooter.motion(edges),
             integration_error=self.rounds[-1].integration_error,
             defect=shooter.defect(edges),
-            violations=largest_violations(cast(Any, self.program), self.result),
+            violations=largest_violations(self.program, self.result),
             rounds=tuple(self.rounds),
             seconds_build=seconds - sum(each.seconds for each in self.rounds),
             nlp=self.result,

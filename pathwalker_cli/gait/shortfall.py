@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from pathwalker_cli.conventions import GENERATORS
-from pathwalker_cli.model.walker import GENERATOR_ROWS
 from pathwalker_cli.stride.series import GaitSeries
 
 __all__ = ["MissingTorque", "Shortfall", "missing_torques"]
@@ -69,10 +67,9 @@ def missing_torques(series: GaitSeries) -> tuple[MissingTorque, ...]:
 def _missing(series: GaitSeries) -> Iterator[MissingTorque]:
     """Yield the largest help for each generator; help against it is help for its antagonist."""
     walker = series.walker
-    for name, generator, row, strength in zip(
-        GENERATORS, walker.generators, GENERATOR_ROWS, walker.max_isometric_torque, strict=True
-    ):
-        help_ = generator.torque_sign * series.reserve[:, row]
+    for muscle, strength in zip(walker.muscles, walker.max_isometric_torque, strict=True):
+        row = walker.skeleton.index(muscle.coordinate)
+        help_ = muscle.torque_sign * series.reserve[:, row]
         k = int(help_.argmax())
         percent = 100.0 * float(series.time[k] / series.time[-1])
-        yield MissingTorque(name, float(help_[k]), float(strength), percent)
+        yield MissingTorque(muscle.name, float(help_[k]), float(strength), percent)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
@@ -13,13 +13,9 @@ from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.stride.series import GaitSeries, gait_series
-from pathwalker_cli.stride.verify import (
-    ActiveBound,
-    Reintegration,
-    Violation,
-    second_engine_residual,
-)
+from pathwalker_cli.stride.verify import Reintegration, second_engine_residual
 
 __all__ = ["TOO_WEAK", "GaitSolution", "LocalOptimum", "StageRecord"]
 
@@ -61,6 +57,7 @@ class LocalOptimum:
         cost: Value of the objective.
         walking_speed: Walking speed [m/s].
         stiffness: K_D right, left, K_P right, left [N m/rad]; empty when barefoot.
+        numbers: Value of every number that was free to choose, by name [SI].
         iterations: Iterations over all stages.
         seconds: Wall seconds.
     """
@@ -73,6 +70,7 @@ class LocalOptimum:
     stiffness: tuple[float, ...]
     iterations: int
     seconds: float
+    numbers: dict[str, float] = field(default_factory=dict)
 
     @property
     def converged(self) -> bool:

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from pathwalker_cli.config import StudyConfig, study_patient
-from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
     gait_bounds,
@@ -27,19 +26,17 @@ from pathwalker_cli.gait.solution import TOO_WEAK, GaitSolution, StageRecord
 from pathwalker_cli.gait.start import ReferenceStride, reference_stride, start_recording
 from pathwalker_cli.gait.structures import gait_blocks
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
+from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, ProgressReport, solve_program
+from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
+from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers, Sample
+from pathwalker_cli.ocp.violations import active_bounds, largest_violations
 from pathwalker_cli.stride.series import gait_series
-from pathwalker_cli.stride.verify import (
-    Reintegration,
-    active_bounds,
-    largest_violations,
-    reintegrate,
-)
+from pathwalker_cli.stride.verify import Reintegration, reintegrate
 
 __all__ = ["GaitSolver", "solve_study"]
 
@@ -96,8 +93,11 @@ class GaitSolver:
         began = time.perf_counter()
         patient = study_patient(self.config)
         model = self.config.model
-        self.walker = build_walker(patient, self.config.condition, model.published, model.backend)
-        self.bounds = gait_bounds(self.walker, self.config.bounds)
+        free = self.config.free
+        self.walker = build_walker(
+            patient, self.config.condition, model.published, model.backend, tuple(free)
+        )
+        self.bounds = gait_bounds(self.walker, self.config.bounds, free)
         self.gait = GaitProblem(self.walker, self._form(), self.config.cost.wanted)
         if self.config.start.gait == "recorded":
             _ = self.stride  # a missing recording is refused before anything is built
@@ -133,6 +133,12 @@ class GaitSolver:
             goals=cost.goals,
         )
 
+    @property
+    def free(self) -> tuple[Unknown, ...]:
+        """The unknowns that may move within their ranges."""
+        ranges = self.bounds.ranges
+        return tuple(u for u in self.walker.unknowns if ranges[u.name][0] < ranges[u.name][1])
+
     @cached_property
     def stride(self) -> ReferenceStride:
         """The stride that a solve without warm start begins with; of a fit, what is followed."""
@@ -152,14 +158,14 @@ class GaitSolver:
         """The recorded instants that a fit follows."""
         return passage_samples(self.stride) if self.config.fits else ()
 
-    def stiffness_guess(self) -> np.ndarray:
-        """Return the guess of the free stiffnesses [N m/rad] within their bounds, (4,) or (0,)."""
-        if self.walker.orthosis is None:
-            return np.zeros(0)
-        guess = self.walker.patient.require_orthosis().stiffness_guess
-        given = self.config.start.stiffness
-        values = [given.get(name, getattr(guess, name.split("_")[0])) for name in STIFFNESSES]
-        lower, upper = self.bounds.table.arrays(STIFFNESSES)
+    def parameter_guess(self) -> np.ndarray:
+        """Return where the search for the walker's unknowns begins, within their bounds, (k,)."""
+        walker, start = self.walker, self.config.start
+        given = {**start.stiffness, **start.free}
+        values = [
+            given.get(u.name, given.get(u.address, u.value(walker.values))) for u in walker.unknowns
+        ]
+        lower, upper = self.bounds.table.arrays(tuple(u.name for u in walker.unknowns))
         return np.clip(values, lower, upper)
 
     def numbers(
@@ -195,7 +201,7 @@ class GaitSolver:
             name,
             result.status,
             motion.intervals,
-            program.program.size,
+            program.size,
             result.iterations,
             result.seconds,
             result.seconds_functions,
@@ -235,7 +241,7 @@ class GaitSolver:
         if warm_start is None:
             program, result = self._track()
             motion = program.to_motion(result.unknowns)
-            motion = replace(motion, parameters=self.stiffness_guess())
+            motion = replace(motion, parameters=self.parameter_guess())
             settings = self.settings(loose or solver.tolerance, solver.first_barrier)
         else:
             warm_start = replace(warm_start, phases=warm_start.phases[: len(self.gait.phases)])
@@ -301,12 +307,16 @@ class GaitSolver:
 
         The orthosis is faded out: its steep stops would fight a stride that ignores it.
         """
-        config, stride = self.config, self.stride
-        stiffness = _FADED * self.stiffness_guess()
-        table = tracking_bounds(self.bounds, stride.durations, stiffness)
+        config, stride, unknowns = self.config, self.stride, self.walker.unknowns
+        shares = np.array([_FADED if unknown.faded else 1.0 for unknown in unknowns])
+        held = shares * self.parameter_guess()
+        names = [unknown.name for unknown in unknowns]
+        table = tracking_bounds(
+            self.bounds, stride.durations, dict(zip(names, held.tolist(), strict=True))
+        )
         meshes = meshing.first(stride.durations[: len(self.gait.phases)], config.mesh)
         costs = len(self.gait.integrals)
-        motion = stride.motion(self.walker, stiffness, meshes, config.mesh.degree, costs)
+        motion = stride.motion(self.walker, held, meshes, config.mesh.degree, costs)
         settings = self.settings(_TRACKING_TOLERANCE, _TRACKING_BARRIER)
         settings = replace(settings, extra={"barrier_tol_factor": 100.0, **settings.extra})
         numbers = self.numbers(_TRACKING, table, _FADED)
@@ -377,7 +387,7 @@ class GaitSolver:
         motion = full_stride(motion) if self.config.half_cycle else motion
         return GaitSolution(
             config=self.config,
-            walker=self.walker,
+            walker=self.walker.with_parameters(motion.parameters),
             status=status,
             last_motion=motion,
             nlp=result,

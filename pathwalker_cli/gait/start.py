@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pathwalker_cli.config import StartConfig
-from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, GRAVITY
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, GRAVITY
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.problem import INTEGRALS
 from pathwalker_cli.gait.stylised import StylisedGait, stylised_trajectory
@@ -69,7 +69,7 @@ class ReferenceStride:
     def motion(
         self,
         walker: Walker,
-        stiffness: np.ndarray,
+        parameters: np.ndarray,
         meshes: tuple[np.ndarray, ...],
         degree: int,
         integrals: int = len(INTEGRALS),
@@ -78,7 +78,7 @@ class ReferenceStride:
 
         Args:
             walker: Who walks.
-            stiffness: Start of the stiffnesses [N m/rad], shape (4,) or empty.
+            parameters: Start of the walker's unknowns, shape (k,).
             meshes: Node positions of every phase.
             degree: Number of collocation points in an interval.
             integrals: Number of running costs.
@@ -86,14 +86,14 @@ class ReferenceStride:
         phases = tuple(
             self._phase(walker, i, mesh, degree, integrals) for i, mesh in enumerate(meshes)
         )
-        return PhasedMotion(phases, np.asarray(stiffness, float))
+        return PhasedMotion(phases, np.asarray(parameters, float))
 
     def _phase(
         self, walker: Walker, i: int, mesh: np.ndarray, degree: int, integrals: int
     ) -> PhaseMotion:
         contact, count = PHASES[i], len(mesh)
         points = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation_times(degree)
-        loads = [CONTACT_FORCES[k].endswith("z") for k in contact.indices]
+        loads = [force.bears for force in contact.forces]
         force = np.where(loads, walker.weight / sum(loads), 0.0)
         n = len(COORDINATES)
         algebraic = np.zeros((count - 1, degree, 2 * n + len(force)))

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.stats import qmc
 
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, StageRecord
@@ -54,14 +53,14 @@ def spread_starts(config: StudyConfig, solver: GaitSolver) -> list[StudyConfig]:
         solver: Its solver, which knows the range of speed and stiffnesses.
     """
     single = config.model_copy(update={"starts": 1})
-    names = STIFFNESSES if solver.walker.orthosis else ()
-    lower, upper = solver.bounds.table.arrays(names)
+    unknowns = solver.walker.unknowns
+    lower, upper = solver.bounds.table.arrays(tuple(unknown.name for unknown in unknowns))
     low = [*(pair[0] for pair in _SPREAD.values()), _FASTER[0], *lower]
     high = [*(pair[1] for pair in _SPREAD.values()), _FASTER[1], *upper]
     cube = qmc.LatinHypercube(len(low), rng=np.random.default_rng(config.start.seed))
     points = qmc.scale(cube.random(config.starts - 1), low, high)
     studies = [single]
-    for knee_flexion, stride_ratio, faster, *stiffness in points.tolist():
+    for knee_flexion, stride_ratio, faster, *free in points.tolist():
         start = config.start.model_copy(
             update={
                 "gait": "synthetic",
@@ -69,7 +68,8 @@ def spread_starts(config: StudyConfig, solver: GaitSolver) -> list[StudyConfig]:
                 "knee_flexion": knee_flexion,
                 "stride_ratio": stride_ratio,
                 "walking_speed": faster * solver.start_speed,
-                "stiffness": dict(zip(names, stiffness, strict=True)),
+                "stiffness": {},
+                "free": {u.address: value for u, value in zip(unknowns, free, strict=True)},
             }
         )
         studies.append(single.model_copy(update={"start": start}))
@@ -117,9 +117,13 @@ def _solved(number: int, study: StudyConfig) -> _Outcome:
         status=solution.status,
         cost=solution.cost,
         walking_speed=walked_distance(last) / last.duration,
-        stiffness=tuple(last.parameters.tolist()),
+        stiffness=tuple(solution.walker.stiffness.tolist()),
         iterations=solution.iterations,
         seconds=float(sum(solution.seconds.values())),
+        numbers={
+            u.name: float(value)
+            for u, value in zip(solver.walker.unknowns, last.parameters, strict=True)
+        },
     )
     meshes = last.meshes[: len(solver.gait.phases)]
     return _Outcome(

@@ -7,14 +7,24 @@ structure therefore share their blocks and all derivatives.
 from __future__ import annotations
 
 from collections.abc import Hashable
+from importlib import resources
+from pathlib import Path
 from typing import Final
+
+import pinocchio as pin
 
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.nlp.kernels import kernels
-from pathwalker_cli.nlp.tape_store import cache_folder, keep_tapes, kept_tapes
+from pathwalker_cli.nlp.tape_store import Makers, cache_folder, keep_tapes, kept_tapes
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 
 __all__ = ["gait_blocks"]
+
+_MAKERS: Final[Makers] = (
+    pin.__version__,
+    Path(str(resources.files("pathwalker_cli.model.backends") / "libpinocchio_casadi.so")),
+)
+"""What makes the expressions of a gait beside the sources: Pinocchio, and its compiled back end."""
 
 _BUILT: Final[dict[Hashable, CollocationBlocks]] = {}
 
@@ -28,7 +38,7 @@ def gait_blocks(gait: GaitProblem, degree: int) -> CollocationBlocks:
     """
     key = (gait.structure, degree)
     if key not in _BUILT:
-        kept = None if kernels() is None else kept_tapes(key)
+        kept = None if kernels() is None else kept_tapes(key, _MAKERS)
         _BUILT[key] = CollocationBlocks(gait.build(), degree, kept)
         if kept is None:
             _keep(_BUILT[key], key)
@@ -42,4 +52,4 @@ def _keep(blocks: CollocationBlocks, key: Hashable) -> None:
     tapes = {b.name: (b.rows, b.tapes) for b in blocks.blocks if b.matters}
     known = {name: (rows, found) for name, (rows, found) in tapes.items() if found is not None}
     if len(known) == len(tapes):
-        keep_tapes(key, known)
+        keep_tapes(key, known, _MAKERS)

@@ -74,8 +74,8 @@ def _mirrored(phase: PhaseMotion, i: int, length: float, costs: np.ndarray) -> P
     """Return a phase with left and right exchanged, one step on."""
     here, there = PHASES[i], PHASES[i + len(PHASES) // 2]
     state_order = mirror_permutation(COORDINATES + VELOCITIES)
-    names = ACCELERATIONS + here.forces + RESERVES
-    wanted = ACCELERATIONS + there.forces + RESERVES
+    names = ACCELERATIONS + here.force_names + RESERVES
+    wanted = ACCELERATIONS + there.force_names + RESERVES
     algebraic_order = [names.index(mirrored(name)) for name in wanted]
     states, inner = phase.states[:, state_order], phase.inner_states[..., state_order]
     states[:, 0] += length

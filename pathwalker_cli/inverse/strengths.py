@@ -25,7 +25,7 @@ from pathwalker_cli.inverse.filters import MOTION_CUTOFF
 from pathwalker_cli.inverse.process import smooth_motion
 from pathwalker_cli.inverse.stance_checks import StanceForce
 from pathwalker_cli.io.fields import Sides
-from pathwalker_cli.model.muscle import MuscleTorqueGenerator, curves_of, generators
+from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, curves_of, generators
 from pathwalker_cli.patient.blocks import Strengths
 from pathwalker_cli.trajectory import Trajectory
 

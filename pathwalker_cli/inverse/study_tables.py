@@ -26,7 +26,7 @@ from pathwalker_cli.inverse.strengths import (
 )
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.c3d import Event
-from pathwalker_cli.model.muscle import generators
+from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import Strengths
 

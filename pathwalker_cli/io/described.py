@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from pathwalker_cli.io.fields import Quantity, Sides
 
-__all__ = ["described", "field_at", "is_model", "side_type"]
+__all__ = ["described", "field_at", "is_model", "quantity_at", "side_type"]
 
 _KINDS: Final[dict[Any, str]] = {
     float: "number",
@@ -92,3 +92,13 @@ def field_at(model: type[BaseModel], place: str) -> FieldInfo:
     if issubclass(inner, Sides):
         inner = inner.model_fields["right"].annotation
     return field_at(inner, rest)
+
+
+def quantity_at(model: type[BaseModel], place: str) -> Quantity:
+    """Return unit and range of the number at a dotted place below a model."""
+    field = field_at(model, place)
+    inside: Any = field.annotation
+    metadata = list(field.metadata)
+    if is_model(inside):
+        metadata += get_args(side_type(inside))[1:]
+    return next(entry for entry in metadata if isinstance(entry, Quantity))

@@ -6,11 +6,13 @@ that connects it to its parent.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from pathwalker_cli.conventions import SIDES, SUFFIX, Condition
+from pathwalker_cli.model.devices import DEVICES
 
 if TYPE_CHECKING:
     from pathwalker_cli.patient import Patient
@@ -116,7 +118,10 @@ class Segment:
 
 
 def segments(
-    patient: Patient, condition: Condition, published: bool = False
+    patient: Patient,
+    condition: Condition,
+    published: bool = False,
+    values: Mapping[str, float] | None = None,
 ) -> tuple[Segment, ...]:
     """Return the segments of a patient, parents before children.
 
@@ -125,7 +130,13 @@ def segments(
         condition: "barefoot", or "orthosis" with its mass added to shank and foot.
         published: Hang the right lower arm and hand where the published model has them: at the
             length of the segment itself below its parent's origin instead of at the parent's.
+        values: Masses of the device by address [kg], if not those of the patient's file.
     """
+    mass = (values or {}).get
+    added = {
+        segment: mass(number.address, patient.number(number.address))
+        for segment, number in DEVICES[condition].added_mass.items()
+    }
     axial = (
         _segment(patient, "pelvis", -1, parent="", origin=(0.0, 0.0, 0.0)),
         _segment(
@@ -133,7 +144,7 @@ def segments(
         ),
         _segment(patient, "head", 1, "trunk", (0.0, 0.0, patient.length("trunk"))),
     )
-    legs = tuple(s for side in SIDES for s in _leg(patient, side, condition))
+    legs = tuple(s for side in SIDES for s in _leg(patient, side, added))
     arms = tuple(s for side in SIDES for s in _arm(patient, side, published and side == "right"))
     return (axial[0], *legs, *axial[1:], *arms)
 
@@ -143,13 +154,9 @@ def total_mass(parts: tuple[Segment, ...]) -> float:
     return sum(part.mass for part in parts)
 
 
-def _leg(patient: Patient, side: str, condition: Condition) -> tuple[Segment, ...]:
-    """Return thigh, shank and foot of a side; an orthosis adds mass, and inertia in proportion."""
+def _leg(patient: Patient, side: str, added: Mapping[str, float]) -> tuple[Segment, ...]:
+    """Return thigh, shank and foot of a side; a device adds mass, and inertia in proportion."""
     suffix = SUFFIX[side]
-    added = {"thigh": 0.0, "shank": 0.0, "foot": 0.0}
-    if condition == "orthosis":
-        mass = patient.require_orthosis().mass
-        added |= {"shank": mass.shank, "foot": mass.foot}
     chain = (
         ("thigh", "pelvis", "hip", patient.length("hip_drop")),
         ("shank", f"thigh_{suffix}", "knee", patient.length("thigh", side)),
@@ -157,7 +164,14 @@ def _leg(patient: Patient, side: str, condition: Condition) -> tuple[Segment, ..
     )
     return tuple(
         _segment(
-            patient, name, -1, parent, (0.0, 0.0, -drop), f"{joint}_{suffix}", side, added[name]
+            patient,
+            name,
+            -1,
+            parent,
+            (0.0, 0.0, -drop),
+            f"{joint}_{suffix}",
+            side,
+            added.get(name, 0.0),
         )
         for name, parent, joint, drop in chain
     )

@@ -1,17 +1,88 @@
-"""The walking pattern as data: which contact forces act in which phase.
+"""Contact with the ground as data: points of the feet, their forces, and the walking pattern.
 
 Phases, in order, follow Sreenivasa et al. (2017), section 2.3: one right and one left step.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final
+from functools import cached_property
+from typing import Final, Literal
 
-from pathwalker_cli.conventions import CONTACT_FORCES
 from pathwalker_cli.errors import InputError
+from pathwalker_cli.model.skeleton import SIDES, SUFFIX, Side
 
-__all__ = ["PHASES", "PHASE_NAMES", "ContactPhase", "phase_named"]
+__all__ = [
+    "FORCES",
+    "PHASES",
+    "PHASE_NAMES",
+    "POINTS",
+    "ContactForce",
+    "ContactPhase",
+    "ContactPoint",
+    "phase_named",
+    "sides_of",
+]
+
+
+@dataclass(frozen=True)
+class ContactPoint:
+    """A point of a foot that may stand on the ground.
+
+    Args:
+        place: Where on the foot.
+        side: Which foot.
+    """
+
+    place: Literal["heel", "toe"]
+    side: Side
+
+    @property
+    def name(self) -> str:
+        """Name of the point and of its frame, e.g. "heel_r"."""
+        return f"{self.place}_{SUFFIX[self.side]}"
+
+    @property
+    def link(self) -> str:
+        """The link that carries it."""
+        return f"foot_{SUFFIX[self.side]}"
+
+
+@dataclass(frozen=True)
+class ContactForce:
+    """One component of the ground reaction force on a point, and the direction it blocks.
+
+    Args:
+        point: Where it acts.
+        axis: "x" forward or "z" up.
+    """
+
+    point: ContactPoint
+    axis: Literal["x", "z"]
+
+    @property
+    def name(self) -> str:
+        """Its name, e.g. "heel_r_z"."""
+        return f"{self.point.name}_{self.axis}"
+
+    @property
+    def bears(self) -> bool:
+        """Whether it is the vertical component."""
+        return self.axis == "z"
+
+
+POINTS: Final = tuple(ContactPoint(place, side) for side in SIDES for place in ("heel", "toe"))
+"""All contact points in order."""
+
+FORCES: Final = tuple(ContactForce(point, axis) for point in POINTS for axis in ("x", "z"))
+"""All components of the ground reaction forces (on the body) in order [N]."""
+
+
+def sides_of(points: Iterable[ContactPoint]) -> tuple[Side, ...]:
+    """Return the feet that points belong to."""
+    there = {point.side for point in points}
+    return tuple(side for side in SIDES if side in there)
 
 
 @dataclass(frozen=True)
@@ -20,60 +91,66 @@ class ContactPhase:
 
     Args:
         name: Name of the phase.
-        forces: Active components in `conventions.CONTACT_FORCES`; each stands for one
-            direction in which its point does not move.
+        forces: Active components; each stands for one direction in which its point does not move.
     """
 
     name: str
-    forces: tuple[str, ...]
+    forces: tuple[ContactForce, ...]
+
+    @cached_property
+    def force_names(self) -> tuple[str, ...]:
+        """Names of the active components."""
+        return tuple(force.name for force in self.forces)
+
+    @cached_property
+    def points(self) -> tuple[ContactPoint, ...]:
+        """Contact points on the ground."""
+        return tuple(dict.fromkeys(force.point for force in self.forces))
 
     @property
-    def points(self) -> tuple[str, ...]:
-        """Contact points on the ground, e.g. ("heel_r", "toe_r")."""
-        return tuple(dict.fromkeys(force[:-2] for force in self.forces))
+    def feet(self) -> tuple[Side, ...]:
+        """Feet on the ground."""
+        return sides_of(self.points)
 
-    @property
+    @cached_property
     def indices(self) -> tuple[int, ...]:
-        """Positions of the active forces in `conventions.CONTACT_FORCES`."""
-        return tuple(CONTACT_FORCES.index(force) for force in self.forces)
+        """Positions of the active components in `FORCES`."""
+        return tuple(FORCES.index(force) for force in self.forces)
 
-    def touched_down(self, following: ContactPhase) -> tuple[str, ...]:
+    def touched_down(self, following: ContactPhase) -> tuple[ContactForce, ...]:
         """Return the directions in which new points are stopped when the next phase begins."""
-        return tuple(f for f in following.forces if f[:-2] not in self.points)
+        return tuple(force for force in following.forces if force.point not in self.points)
 
-    def lifted_off(self, following: ContactPhase) -> tuple[str, ...]:
+    def lifted_off(self, following: ContactPhase) -> tuple[ContactForce, ...]:
         """Return the forces that have faded to zero when the next phase begins.
 
         While its foot stays on the ground a point loses its vertical force only: the friction
         of a rigid foot may pass from heel to toe at once.
         """
-        gone = [f for f in self.forces if f[:-2] not in following.points]
-        feet_left = {point[-1] for point in following.points}
-        return tuple(f for f in gone if f.endswith("z") or f[-3] not in feet_left)
+        gone = [force for force in self.forces if force.point not in following.points]
+        return tuple(f for f in gone if f.bears or f.point.side not in following.feet)
 
 
-def _flat(side: str) -> tuple[str, ...]:
-    return (f"heel_{side}_x", f"heel_{side}_z", f"toe_{side}_z")
+def _on(side: Side, *components: str) -> tuple[ContactForce, ...]:
+    """Return components of a foot in the order of `FORCES`, e.g. "heel x"."""
+    return tuple(
+        f for f in FORCES if f.point.side == side and f"{f.point.place} {f.axis}" in components
+    )
 
 
-def _toe(side: str) -> tuple[str, ...]:
-    return (f"toe_{side}_x", f"toe_{side}_z")
+def _step(side: Side, other: Side) -> tuple[ContactPhase, ...]:
+    """Return the four phases from single support of a foot to double support of both."""
+    flat, toe = ("heel x", "heel z", "toe z"), ("toe x", "toe z")
+    standing, landing = _on(side, *toe), _on(other, "heel x", "heel z")
+    return (
+        ContactPhase(f"{side}_flat", _on(side, *flat)),
+        ContactPhase(f"{side}_toe", standing),
+        ContactPhase(f"{side}_toe_{other}_heel", standing + landing),
+        ContactPhase(f"{side}_toe_{other}_flat", standing + _on(other, *flat)),
+    )
 
 
-def _heel(side: str) -> tuple[str, ...]:
-    return (f"heel_{side}_x", f"heel_{side}_z")
-
-
-PHASES: Final = (
-    ContactPhase("right_flat", _flat("r")),
-    ContactPhase("right_toe", _toe("r")),
-    ContactPhase("right_toe_left_heel", _toe("r") + _heel("l")),
-    ContactPhase("right_toe_left_flat", _toe("r") + _flat("l")),
-    ContactPhase("left_flat", _flat("l")),
-    ContactPhase("left_toe", _toe("l")),
-    ContactPhase("left_toe_right_heel", _toe("l") + _heel("r")),
-    ContactPhase("left_toe_right_flat", _toe("l") + _flat("r")),
-)
+PHASES: Final = _step("right", "left") + _step("left", "right")
 """The eight phases of a stride."""
 
 PHASE_NAMES: Final = tuple(phase.name for phase in PHASES)

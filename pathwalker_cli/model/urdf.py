@@ -1,18 +1,21 @@
 """The patient's walker as a URDF, and that URDF as a Pinocchio model.
 
 The pelvis hangs on the world by two sliders and a hinge, so that the joints are exactly
-`conventions.COORDINATES`.  Heels and toes are links without mass; trunk, head and arms are welded.
+those of the skeleton.  Heels and toes are links without mass; trunk, head and arms are welded.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import COORDINATES, GRAVITY, ROOT, SIDES, SUFFIX, Condition
+from pathwalker_cli.conventions import GRAVITY, Condition
 from pathwalker_cli.model.anthropometry import Segment, Vector, segments
+from pathwalker_cli.model.contact import POINTS
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, Joint
 from pathwalker_cli.patient import Patient
 
 __all__ = ["pinocchio_model", "urdf_text"]
@@ -22,18 +25,24 @@ _ANGLES: Final = _LIMITS.format(-3.2, 3.2)
 _TRAVEL: Final = _LIMITS.format(-1000, 1000)
 """A URDF must state limits; those of the optimal control problems stand in the study's config."""
 
-_ROOT_AXES: Final = {"pelvis_tx": "1 0 0", "pelvis_tz": "0 0 1", "pelvis_tilt": "0 1 0"}
+_AXES: Final = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 
 
-def urdf_text(patient: Patient, condition: Condition, published: bool = False) -> str:
+def urdf_text(
+    patient: Patient,
+    condition: Condition,
+    published: bool = False,
+    values: Mapping[str, float] | None = None,
+) -> str:
     """Return the walker as URDF text; the same input always gives the same bytes.
 
     Args:
         patient: The patient.
         condition: "barefoot" or "orthosis".
         published: Reproduce the published model's misplaced right lower arm and hand.
+        values: Masses of the device by address [kg], if not those of the patient's file.
     """
-    parts = segments(patient, condition, published)
+    parts = segments(patient, condition, published, values)
     lines = [
         '<?xml version="1.0"?>',
         "<!-- Sagittal walker: x forward, z up, rotations about +y; m, kg, kg m^2, rad.",
@@ -46,24 +55,28 @@ def urdf_text(patient: Patient, condition: Condition, published: bool = False) -
         lines += _link(part)
         if part.parent:
             lines += _joint(part.joint, part.parent, part.name, part.origin)
-    for side in SIDES:
-        suffix = SUFFIX[side]
-        points = patient.contacts(condition)[side]
-        for name, (x, z) in (("heel", points.heel), ("toe", points.toe)):
-            lines.append(f'  <link name="{name}_{suffix}"/>')
-            lines += _joint("", f"foot_{suffix}", f"{name}_{suffix}", (x, 0.0, z))
+    for point in POINTS:
+        x, z = getattr(patient.contacts(condition)[point.side], point.place)
+        lines.append(f'  <link name="{point.name}"/>')
+        lines += _joint("", point.link, point.name, (x, 0.0, z))
     return "\n".join([*lines, "</robot>", ""])
 
 
-def pinocchio_model(patient: Patient, condition: Condition, published: bool = False) -> pin.Model:
-    """Return the walker's Pinocchio model; its q is `conventions.COORDINATES` in order.
+def pinocchio_model(
+    patient: Patient,
+    condition: Condition,
+    published: bool = False,
+    values: Mapping[str, float] | None = None,
+) -> pin.Model:
+    """Return the walker's Pinocchio model; its q is that of the skeleton.
 
     Args:
         patient: The patient.
         condition: "barefoot" or "orthosis".
         published: Reproduce the published model's misplaced right lower arm and hand.
+        values: Masses of the device by address [kg], if not those of the patient's file.
     """
-    model = _ordered(pin.buildModelFromXML(urdf_text(patient, condition, published)))
+    model = _ordered(pin.buildModelFromXML(urdf_text(patient, condition, published, values)))
     model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
     return model
 
@@ -108,34 +121,31 @@ def _joint(name: str, parent: str, child: str, origin: Vector) -> list[str]:
 
 def _root() -> list[str]:
     """Return the three joints between world and pelvis with the empty links between them."""
-    lines: list[str] = []
-    parent = "world"
-    for name in ROOT:
-        turns = name == "pelvis_tilt"
-        child = "pelvis" if turns else f"{name}_slider"
-        if not turns:
-            lines.append(f'  <link name="{child}"/>')
-        lines += [
-            f'  <joint name="{name}" type="{"revolute" if turns else "prismatic"}">',
-            f'    <parent link="{parent}"/>',
-            f'    <child link="{child}"/>',
-            f'    <axis xyz="{_ROOT_AXES[name]}"/>',
-            f"    {_ANGLES if turns else _TRAVEL}",
-            "  </joint>",
-        ]
-        parent = child
-    return lines
+    return [line for joint in PLANAR_WALKER.joints if not joint.actuated for line in _hung(joint)]
+
+
+def _hung(joint: Joint) -> list[str]:
+    """Return a joint of the root; the pelvis itself is written with the segments."""
+    return [
+        *([f'  <link name="{joint.child}"/>'] if joint.slides else []),
+        f'  <joint name="{joint.coordinate}" type="{"prismatic" if joint.slides else "revolute"}">',
+        f'    <parent link="{joint.parent}"/>',
+        f'    <child link="{joint.child}"/>',
+        f'    <axis xyz="{_AXES[joint.axis]}"/>',
+        f"    {_TRAVEL if joint.slides else _ANGLES}",
+        "  </joint>",
+    ]
 
 
 def _ordered(parsed: pin.Model) -> pin.Model:
-    """Return the same model with its joints in the order of `COORDINATES`.
+    """Return the same model with its joints in the order of the skeleton.
 
     The parser sorts the children of a link by name, which puts the left leg before the right one.
     """
     model: Any = pin.Model()
     model.name = parsed.name
     new_index = {0: 0}
-    for name in COORDINATES:
+    for name in PLANAR_WALKER.coordinates:
         old = parsed.getJointId(name)
         parent = new_index[parsed.parents[old]]
         placement = parsed.jointPlacements[old]

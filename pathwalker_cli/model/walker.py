@@ -1,9 +1,9 @@
-"""The walker: one patient's rigid bodies, muscle torque generators, orthosis and ground contact."""
+"""The walker: one patient's skeleton, force elements, contacts, and the numbers of all of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -11,32 +11,22 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import (
-    CONDITIONS,
-    CONTACT_FORCES,
-    CONTACT_POINTS,
-    COORDINATES,
-    ROOT,
-    SIDES,
-    SUFFIX,
-    Condition,
-)
+from pathwalker_cli.conventions import CONDITIONS, CONTACT_FORCES, CONTACT_POINTS, SIDES, Condition
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.backends import RigidBodyFunctions, rigid_body_functions
 from pathwalker_cli.model.contact import ContactPhase, phase_named
-from pathwalker_cli.model.muscle import MuscleTorqueGenerator, generators
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
+from pathwalker_cli.model.devices import DEVICES, Device
+from pathwalker_cli.model.elements import ForceElement, State, element_forces, generalised_forces
+from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
+from pathwalker_cli.model.elements.orthosis import OrthosisSide
+from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at, with_unknowns
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 
-__all__ = ["ANKLES", "GENERATOR_ROWS", "Walker", "build_walker"]
-
-ANKLES: Final = tuple(COORDINATES.index(f"ankle_{SUFFIX[side]}") for side in SIDES)
-"""Positions of the right and the left ankle among the coordinates."""
+__all__ = ["Walker", "build_walker"]
 
 _GENERATORS: Final = generators()
-GENERATOR_ROWS: Final = tuple(COORDINATES.index(g.coordinate) for g in _GENERATORS)
-"""Position of the coordinate that each generator drives."""
 
 
 @dataclass(frozen=True)
@@ -46,28 +36,77 @@ class Walker:
     Args:
         patient: The patient.
         condition: "barefoot" or "orthosis".
-        model: Rigid bodies in Pinocchio; its q is `conventions.COORDINATES`.
+        skeleton: Bodies and joints; names and order of the coordinates.
+        model: Rigid bodies in Pinocchio.
         rigid_body: The same as CasADi functions.
-        max_isometric_torque: Strengths in the order of `conventions.GENERATORS` [N m], (14,).
-        orthosis: Fixed orthosis parameters right and left; None when barefoot.
+        muscles: The muscle torque generators.
+        device: What is worn.
+        values: Every named number by address [SI].
+        unknowns: The numbers that a problem is free to choose.
+        published: Whether it reproduces the quirks of the published model.
     """
 
     patient: Patient
     condition: Condition
+    skeleton: Skeleton
     model: pin.Model
     rigid_body: RigidBodyFunctions
-    max_isometric_torque: np.ndarray
-    orthosis: tuple[OrthosisSide, OrthosisSide] | None
+    muscles: tuple[MuscleTorqueGenerator, ...]
+    device: Device
+    values: Mapping[str, float]
+    unknowns: tuple[Unknown, ...] = ()
+    published: bool = False
 
     @property
     def backend(self) -> str:
         """Name of the dynamics back end at work."""
         return self.rigid_body.backend
 
+    @cached_property
+    def elements(self) -> tuple[ForceElement, ...]:
+        """All force elements: muscles, then what the device adds."""
+        return (*self.muscles, *self.device.forces)
+
+    @cached_property
+    def numbers(self) -> tuple[Number, ...]:
+        """Every named number: of the elements, then of the bodies."""
+        return _numbers(self.elements, self.device)
+
     @property
-    def generators(self) -> tuple[MuscleTorqueGenerator, ...]:
-        """The 14 muscle torque generators."""
-        return _GENERATORS
+    def max_isometric_torque(self) -> np.ndarray:
+        """Strengths in the order of `conventions.GENERATORS` [N m], (14,)."""
+        return np.array([self.values[m.numbers[0].address] for m in self.muscles])
+
+    @property
+    def orthosis(self) -> tuple[OrthosisSide, ...] | None:
+        """All but the springs of the orthoses right and left; None when barefoot."""
+        if not self.device.worn:
+            return None
+        return tuple(self.device.elements[side].fixed(self.values) for side in SIDES)
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """K_D right, left, K_P right, left [N m/rad], shape (4,); empty when barefoot."""
+        springs = [self.device.elements[s].springs(self.values) for s in SIDES if self.device.worn]
+        return np.array(springs).T.ravel()
+
+    def with_parameters(self, parameters: Sequence[float] | np.ndarray) -> Walker:
+        """Return the walker in which the unknowns have these values [SI], in their order."""
+        values = with_unknowns(self.values, self.unknowns, parameters)
+        return self.with_values(values)
+
+    def with_values(self, values: Mapping[str, float]) -> Walker:
+        """Return the walker with other numbers, by address [SI]."""
+        values = {**self.values, **values}
+        changed = replace(self, values=values)
+        bodies = [n.address for n in self.device.added_mass.values()]
+        if all(values[address] == self.values[address] for address in bodies):
+            return changed
+        model = pinocchio_model(self.patient, self.condition, self.published, values)
+        parameters = self.rigid_body.parameters_for(model)
+        return replace(
+            changed, model=model, rigid_body=replace(self.rigid_body, parameters=parameters)
+        )
 
     @property
     def total_mass(self) -> float:
@@ -88,6 +127,64 @@ class Walker:
         hip = np.mean([data.oMi[self.model.getJointId(f"hip_{s}")].translation[2] for s in "rl"])
         return float(hip - self.contact_points(zero)[:, 1].mean())
 
+    def moves_bodies(self, unknown: Unknown) -> bool:
+        """Return whether an unknown is a number of the rigid bodies."""
+        return any(number in self.device.added_mass.values() for number in unknown.numbers)
+
+    def body_slopes(self, unknown: Unknown) -> np.ndarray:
+        """Return the derivatives of the rigid bodies' numbers in a mass of the device, shape (k,).
+
+        They are exact: masses and moments of inertia are linear in it, and nothing else changes.
+        """
+        values = {a: self.values[a] + 1.0 for a in unknown.addresses}
+        return self.with_values(values).rigid_body.parameters - self.rigid_body.parameters
+
+    def state(self, q: Any, v: Any, activation: Any) -> State:
+        """Return coordinates, velocities and activations by name.
+
+        Args:
+            q: Generalised coordinates, one entry or row per coordinate.
+            v: Generalised velocities, likewise.
+            activation: Activations, one entry or row per muscle torque generator.
+        """
+        names = self.skeleton.coordinates
+        muscles = [muscle.name for muscle in self.muscles]
+        return State(*(
+            dict(zip(keys, _entries(values), strict=True))
+            for keys, values in ((names, q), (names, v), (muscles, activation))
+        ))  # fmt: skip
+
+    def element_forces(self, q: np.ndarray, v: np.ndarray, activation: np.ndarray) -> np.ndarray:
+        """Return the forces of all elements at m instants, by NumPy.
+
+        Args:
+            q: Generalised coordinates [m, rad], shape (m, 10).
+            v: Generalised velocities [m/s, rad/s], shape (m, 10).
+            activation: Activations in [0, 1], shape (m, 14).
+
+        Returns:
+            Forces [N m] in the order of `elements`, shape (m, k).
+        """
+        state = self.state(np.transpose(q), np.transpose(v), np.transpose(activation))
+        return np.stack(element_forces(self.elements, state, self.values), axis=-1)
+
+    def generalised_forces(self, forces: np.ndarray) -> np.ndarray:
+        """Return the sum of element forces (m, k) on every coordinate [N, N m], shape (m, 10)."""
+        columns = list(np.moveaxis(np.asarray(forces, float), -1, 0))
+        zero = np.zeros(np.shape(forces)[:-1])
+        names = self.skeleton.coordinates
+        return np.stack(generalised_forces(self.elements, columns, names, zero), axis=-1)
+
+    @cached_property
+    def force_function(self) -> ca.Function:
+        """Function (q, v, activation) -> forces of all elements (k,), generalised forces (10,)."""
+        n, m = self.skeleton.size, len(self.muscles)
+        q, v, a = (ca.SX.sym(name, size) for name, size in (("q", n), ("v", n), ("a", m)))
+        state = self.state(*(ca.vertsplit(x) for x in (q, v, a)))
+        forces = element_forces(self.elements, state, self.values)
+        total = generalised_forces(self.elements, forces, self.skeleton.coordinates, ca.SX(0))
+        return ca.Function("forces", [q, v, a], [ca.vertcat(*forces), ca.vertcat(*total)])
+
     def muscle_torques(self, q: Any, v: Any, activation: Any) -> np.ndarray:
         """Return the signed joint torque of each generator, equation (1).
 
@@ -99,14 +196,13 @@ class Walker:
         Returns:
             Torques [N m] in the order of `conventions.GENERATORS`, shape (14,).
         """
-        q, v = _vector(q, 10, "q"), _vector(v, 10, "v")
-        activation = _vector(activation, 14, "activation")
-        return np.array(
-            [
-                float(g.torque(q[row], v[row], activation[i], self.max_isometric_torque[i]))
-                for i, (g, row) in enumerate(zip(_GENERATORS, GENERATOR_ROWS, strict=True))
-            ]
+        n, m = self.skeleton.size, len(self.muscles)
+        q, v, activation = (
+            _vector(q, n, "q"),
+            _vector(v, n, "v"),
+            _vector(activation, m, "activation"),
         )
+        return self.element_forces(q, v, activation)[:m]
 
     def orthosis_torques(self, q: Any, k_d: Any, k_p: Any) -> np.ndarray:
         """Return the torques of the orthoses on the ankles.
@@ -119,12 +215,17 @@ class Walker:
         Returns:
             Torques right, left [N m], + = plantarflexion, shape (2,); zero when barefoot.
         """
-        q = _vector(q, 10, "q")
-        if self.orthosis is None:
+        q, rest = _vector(q, self.skeleton.size, "q"), np.zeros(self.skeleton.size)
+        if not self.device.worn:
             return np.zeros(2)
-        k_d, k_p = np.broadcast_to(k_d, 2), np.broadcast_to(k_p, 2)
-        sides = zip(self.orthosis, ANKLES, k_d, k_p, strict=True)
-        return np.array([float(orthosis_torque(s, q[row], d, p)) for s, row, d, p in sides])
+        pairs = zip(SIDES, np.broadcast_to(k_d, 2), np.broadcast_to(k_p, 2), strict=True)
+        springs = {
+            number.address: float(value)
+            for side, *pair in pairs
+            for number, value in zip(self.device.elements[side].numbers[:2], pair, strict=True)
+        }
+        muscles = np.zeros(len(self.muscles))
+        return self.with_values(springs).element_forces(q, rest, muscles)[len(muscles) :]
 
     def joint_torques(self, muscle: Any, orthosis: Any = (0.0, 0.0)) -> np.ndarray:
         """Return generalised forces of the actuators [N m], shape (10,); zero at the root.
@@ -133,10 +234,11 @@ class Walker:
             muscle: Torque of each generator [N m], shape (14,).
             orthosis: Torque of the orthoses right, left [N m], shape (2,).
         """
-        tau = np.zeros(len(COORDINATES))
-        np.add.at(tau, list(GENERATOR_ROWS), _vector(muscle, 14, "muscle"))
-        np.add.at(tau, list(ANKLES), _vector(orthosis, 2, "orthosis"))
-        return tau
+        muscle = _vector(muscle, len(self.muscles), "muscle")
+        orthosis = _vector(orthosis, 2, "orthosis")
+        return self.generalised_forces(
+            np.concatenate([muscle, orthosis[: len(self.device.forces)]])
+        )
 
     def contact_dynamics(
         self, phase: str | int | ContactPhase, q: Any, v: Any, tau: Any
@@ -155,10 +257,11 @@ class Walker:
             vdot [m/s^2, rad/s^2], shape (10,), and forces on the body [N] in the order of
             `conventions.CONTACT_FORCES`, shape (8,); zero where there is no contact.
         """
-        q, v, tau = _vector(q, 10, "q"), _vector(v, 10, "v"), np.asarray(tau, float).ravel()
-        if tau.size == len(COORDINATES) - len(ROOT):
-            tau = np.concatenate([np.zeros(len(ROOT)), tau])
-        tau = _vector(tau, 10, "tau")
+        n, root = self.skeleton.size, len(self.skeleton.root)
+        q, v, tau = _vector(q, n, "q"), _vector(v, n, "v"), np.asarray(tau, float).ravel()
+        if tau.size == n - root:
+            tau = np.concatenate([np.zeros(root), tau])
+        tau = _vector(tau, n, "tau")
         vdot, forces = self.contact_dynamics_series(phase, q[None], v[None], tau[None])
         return vdot[0], forces[0]
 
@@ -180,7 +283,7 @@ class Walker:
             terms: What evaluates `dynamics_terms` at m points, if not the function itself.
         """
         active = list((phase if isinstance(phase, ContactPhase) else phase_named(phase)).indices)
-        count, n, size = len(q), len(COORDINATES), len(active)
+        count, n, size = len(q), self.skeleton.size, len(active)
         mass, bias, jacobian, drift = map(np.asarray, (terms or self.dynamics_terms)(q.T, v.T))
         # of m instants CasADi sets the matrices side by side
         jacobian = jacobian.reshape(-1, count, n)[active].swapaxes(0, 1)
@@ -196,7 +299,7 @@ class Walker:
 
     def contact_points(self, q: Any) -> np.ndarray:
         """Return right heel, right toe, left heel, left toe: x and z [m], shape (4, 2)."""
-        q = _vector(q, 10, "q")
+        q = _vector(q, self.skeleton.size, "q")
         return np.asarray(self.rigid_body.point_positions(q, self.rigid_body.parameters)).reshape(
             4, 2
         )
@@ -232,11 +335,17 @@ def _vector(values: Any, size: int, name: str) -> np.ndarray:
     return vector
 
 
+def _entries(values: Any) -> list[Any]:
+    """Return the entries of a list, or the rows of an array."""
+    return list(values)
+
+
 def build_walker(
     patient: Patient,
     condition: Condition = "barefoot",
     published: bool = False,
     backend: str = "auto",
+    free: Sequence[str] = (),
 ) -> Walker:
     """Return the walking model of a patient.
 
@@ -245,35 +354,57 @@ def build_walker(
         condition: "barefoot" or "orthosis".
         published: Reproduce the quirks of the published model (right forearm).
         backend: Dynamics back end, see `model.backends`.
+        free: Addresses of numbers that a problem may choose, beside those that it looks for anyway.
 
     Raises:
         InputError: If the condition does not exist.
         PatientError: If the patient lacks strengths or, for "orthosis", an orthosis.
+        ConfigError: If there is no such number.
     """
     if condition not in CONDITIONS:
         raise InputError(
             f"there is no condition {condition!r}", allowed=" or ".join(map(repr, CONDITIONS))
         )
+    device = DEVICES[condition]
+    if device.worn:
+        patient.require_orthosis()
     model = pinocchio_model(patient, condition, published)
-    strengths = np.array(patient.max_isometric_torque)
-    strengths.setflags(write=False)
-    orthosis = _orthosis_sides(patient) if condition == "orthosis" else None
-    functions = rigid_body_functions(model, CONTACT_POINTS, backend)
-    return Walker(patient, condition, model, functions, strengths, orthosis)
-
-
-def _orthosis_sides(patient: Patient) -> tuple[OrthosisSide, OrthosisSide]:
-    data = patient.require_orthosis()
-    right, left = (
-        OrthosisSide(
-            neutral_angle=data.neutral_angle,
-            free_play=data.free_play,
-            preload_torque=data.preload_torque,
-            dorsiflexion_stop=data.dorsiflexion_stop[side],
-            plantarflexion_stop=data.plantarflexion_stop[side],
-            dorsiflexion_stop_stiffness=data.stop_stiffness.dorsiflexion,
-            plantarflexion_stop_stiffness=data.stop_stiffness.plantarflexion,
-        )
-        for side in SIDES
+    numbers = _numbers((*_GENERATORS, *device.forces), device)
+    values = {number.address: patient.number(number.address) for number in numbers}
+    return Walker(
+        patient=patient,
+        condition=condition,
+        skeleton=PLANAR_WALKER,
+        model=model,
+        rigid_body=rigid_body_functions(model, CONTACT_POINTS, backend),
+        muscles=_GENERATORS,
+        device=device,
+        values=values,
+        unknowns=_unknowns(device, numbers, free),
+        published=published,
     )
-    return right, left
+
+
+def _numbers(elements: Sequence[ForceElement], device: Device) -> tuple[Number, ...]:
+    """Return the numbers of elements, then those of the bodies."""
+    of_elements = (number for element in elements for number in element.numbers)
+    return (*of_elements, *device.added_mass.values())
+
+
+def _unknowns(
+    device: Device, numbers: Sequence[Number], free: Sequence[str]
+) -> tuple[Unknown, ...]:
+    """Return what a problem chooses: what is asked for, and what a device is there to be found for.
+
+    What a device is identified for stands first, per kind right before left, unless both sides
+    alike are asked for.
+    """
+    asked = unknowns_at(free, numbers)
+    taken = {address for unknown in asked for address in unknown.addresses}
+    usual = [
+        Unknown.of(number)
+        for name in device.identified
+        for number in numbers
+        if number.name == name and number.address not in taken
+    ]
+    return (*usual, *asked)

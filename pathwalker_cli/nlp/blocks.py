@@ -14,22 +14,20 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.nlp.assembly import KINDS, Assembly, Part, Source
+from pathwalker_cli.nlp.assembly import Assembly, Part, Source, mapped_functions
 from pathwalker_cli.nlp.frozen import FrozenTerms
 from pathwalker_cli.nlp.kernels import kernels
-from pathwalker_cli.nlp.mapped import mapped_functions
 from pathwalker_cli.nlp.tape import Tape, patterns_of
 from pathwalker_cli.nlp.taped import taped_functions
 
-__all__ = ["Block", "BlockProgram", "KeptBlock", "Occurrences"]
+__all__ = ["Block", "BlockProgram", "Expressions", "Occurrences"]
 
 
 @dataclass(frozen=True)
-class Block:
-    """A small function that occurs many times in a nonlinear program.
+class Expressions:
+    """What a block computes.
 
     Args:
-        name: Name for reports.
         unknowns: Its unknowns, SX of shape (n,).
         data: Numbers that differ from occurrence to occurrence, SX of shape (m,).
         shared: Numbers that all occurrences have in common, SX of shape (s,).
@@ -38,7 +36,6 @@ class Block:
         frozen: Stand-ins used in the expressions, see `FrozenTerms`.
     """
 
-    name: str
     unknowns: ca.SX
     data: ca.SX
     shared: ca.SX
@@ -46,71 +43,27 @@ class Block:
     objective: ca.SX = field(default_factory=lambda: ca.SX(0))
     frozen: FrozenTerms = field(default_factory=FrozenTerms)
 
-    @property
-    def rows(self) -> int:
-        """Number of constraint rows."""
-        return int(self.constraints.numel())
+    def functions(self, name: str) -> dict[str, ca.Function]:
+        """Return the functions by kind.
 
-    @property
-    def matters(self) -> bool:
-        """Whether the block has rows or adds to the objective."""
-        return bool(self.rows) or self.has_objective
+        `values`: (unknowns, data, shared) -> constraints, objective; `jacobian`: the same ->
+        Jacobian of constraints, gradient of objective; `hessian`: (..., lam_f, lam_g) -> upper
+        Hessian of the Lagrangian.
+        """
+        x, objective, rows = self.unknowns, self.objective, self.constraints
+        gradient = ca.sparsify(ca.gradient(objective, x))
+        lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", rows.numel())
+        lagrangian = lam_f * objective + ca.dot(lam_g, rows)
+        hessian = ca.triu(ca.hessian(lagrangian, x)[0])
+        return {
+            "values": self._function(f"{name}_values", [rows, ca.sparsify(objective)]),
+            "jacobian": self._function(f"{name}_jacobian", [ca.jacobian(rows, x), gradient]),
+            "hessian": self._function(f"{name}_hessian", [hessian], lam_f, lam_g),
+        }
 
-    @property
-    def has_objective(self) -> bool:
-        """Whether the block adds to the objective."""
-        return not self.objective.is_zero()
-
-    @cached_property
-    def values(self) -> ca.Function:
-        """Function (unknowns, data, shared) -> constraints, objective."""
-        return self._function("values", [self.constraints, ca.sparsify(self.objective)], [])
-
-    @cached_property
-    def jacobian(self) -> ca.Function:
-        """Function (unknowns, data, shared) -> Jacobian of constraints, gradient of objective."""
-        return self._function("jacobian", self._first_derivatives, [])
-
-    @cached_property
-    def hessian(self) -> ca.Function:
-        """Function (unknowns, data, shared, lam_f, lam_g) -> upper Hessian of the Lagrangian."""
-        lam_f, lam_g = ca.SX.sym("lam_f"), ca.SX.sym("lam_g", self.rows)
-        lagrangian = lam_f * self.objective + ca.dot(lam_g, self.constraints)
-        hessian = ca.triu(ca.hessian(lagrangian, self.unknowns)[0])
-        return self._function("hessian", [hessian], [lam_f, lam_g])
-
-    @cached_property
-    def tapes(self) -> dict[str, Tape] | None:
-        """Tapes of `values`, `jacobian` and `hessian`; None where one cannot be made."""
-        tapes = {}
-        for kind in KINDS:
-            tape = Tape.of(getattr(self, kind))
-            if tape is None:
-                return None
-            tapes[kind] = tape
-        return tapes
-
-    @cached_property
-    def functions(self) -> dict[str, ca.Function]:
-        """The functions by kind."""
-        return {kind: getattr(self, kind) for kind in KINDS}
-
-    @property
-    def patterns(self) -> dict[str, tuple[np.ndarray, ...]]:
-        """Row and column of the nonzeros of every output, shape (nnz, 2) each, by kind."""
-        if self.tapes is not None:
-            return {kind: tape.patterns for kind, tape in self.tapes.items()}
-        return {kind: patterns_of(function) for kind, function in self.functions.items()}
-
-    @cached_property
-    def _first_derivatives(self) -> list[ca.SX]:
-        gradient = ca.gradient(self.objective, self.unknowns)
-        return [ca.jacobian(self.constraints, self.unknowns), ca.sparsify(gradient)]
-
-    def _function(self, kind: str, outputs: list[ca.SX], more: list[ca.SX]) -> ca.Function:
+    def _function(self, name: str, outputs: list[ca.SX], *more: ca.SX) -> ca.Function:
         """Return a function in which the frozen symbols are replaced by what they stand for."""
         inputs = [self.unknowns, self.data, self.shared, *more]
-        name = f"{self.name}_{kind}"
         if not self.frozen.symbols:
             return ca.Function(name, inputs, outputs)
         outer = ca.Function("frozen", [*inputs, self.frozen.symbol_vector], outputs)
@@ -118,36 +71,67 @@ class Block:
         return ca.Function(name, inputs, results)
 
 
-@dataclass(frozen=True)
-class KeptBlock:
-    """A block whose tapes are known; its expressions are built only if somebody asks for functions.
+class Block:
+    """A small function that occurs many times in a nonlinear program.
 
     Args:
         name: Name for reports.
-        rows: Number of constraint rows.
-        tapes: Tapes of `values`, `jacobian` and `hessian`; none of a block that does not matter.
-        build: Returns the block itself.
+        build: Returns its expressions; called when somebody asks for what is not kept.
+        kept: Number of rows and tapes by kind, where they are known; a block that does not matter
+            has none.
     """
 
-    name: str
-    rows: int
-    tapes: dict[str, Tape]
-    build: Callable[[], Block]
+    def __init__(
+        self,
+        name: str,
+        build: Callable[[], Expressions],
+        kept: tuple[int, dict[str, Tape]] | None = None,
+    ) -> None:
+        self.name = name
+        self.kept = kept
+        self._build = build
 
-    @property
+    @cached_property
+    def expressions(self) -> Expressions:
+        """What it computes."""
+        return self._build()
+
+    @cached_property
+    def rows(self) -> int:
+        """Number of constraint rows."""
+        return self.kept[0] if self.kept else int(self.expressions.constraints.numel())
+
+    @cached_property
     def matters(self) -> bool:
         """Whether the block has rows or adds to the objective."""
-        return bool(self.tapes)
+        if self.kept:
+            return bool(self.kept[1])
+        return bool(self.rows) or not self.expressions.objective.is_zero()
+
+    @cached_property
+    def tapes(self) -> dict[str, Tape] | None:
+        """Tapes of the functions by kind; None where one cannot be made."""
+        if self.kept:
+            return self.kept[1]
+        tapes = {}
+        for kind, function in self.functions.items():
+            tape = Tape.of(function)
+            if tape is None:
+                return None
+            tapes[kind] = tape
+        return tapes
+
+    @cached_property
+    def functions(self) -> dict[str, ca.Function]:
+        """The functions by kind, see `Expressions.functions`."""
+        return self.expressions.functions(self.name)
 
     @property
     def patterns(self) -> dict[str, tuple[np.ndarray, ...]]:
         """Row and column of the nonzeros of every output, shape (nnz, 2) each, by kind."""
-        return {kind: tape.patterns for kind, tape in self.tapes.items()}
-
-    @cached_property
-    def functions(self) -> dict[str, ca.Function]:
-        """The functions by kind."""
-        return self.build().functions
+        if self.tapes is not None:
+            return {kind: tape.patterns for kind, tape in self.tapes.items()}
+        return {kind: patterns_of(function) for kind, function in self.functions.items()}
 
 
 @dataclass(frozen=True)
@@ -162,13 +146,15 @@ class Occurrences:
         upper: Upper bounds of the rows, shape (r, count).
         row_scale: Physical units per row unit, shape (r,).
         row_names: Names of the rows, r of them.
-        labels: Where each occurrence is, e.g. "left_flat at 40 %", count of them.
-        times: Instant of every row, shape (r, count); only differences within a series matter.
-        weights: Quadrature weight of every row, shape (r, count).
-        series: Rows of the same series sample one function of time; r names.
+        labels: Where each occurrence is, e.g. "ascent at 40 % of the phase", count of them.
+        times: Instants of the rows, shape (r, count) or broadcast to it; only differences within a
+            series matter.
+        weights: Quadrature weights of the rows, shape (r, count) or broadcast to it.
+        series: Rows of the same series sample one function of time; r names, or none where every
+            row is its own.
     """
 
-    block: Block | KeptBlock
+    block: Block
     columns: np.ndarray
     data: np.ndarray
     lower: np.ndarray
@@ -176,18 +162,9 @@ class Occurrences:
     row_scale: np.ndarray
     row_names: Sequence[str]
     labels: Sequence[str]
-    times: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    weights: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    times: np.ndarray | float = 0.0
+    weights: np.ndarray | float = 1.0
     series: Sequence[str] = ()
-
-    def __post_init__(self) -> None:
-        """Let rows that stand at one instant only, or alone, be their own series."""
-        shape = (self.block.rows, self.count)
-        for name, default in (("times", 0.0), ("weights", 1.0)):
-            if not getattr(self, name).size:
-                object.__setattr__(self, name, np.full(shape, default))
-        if not self.series:
-            object.__setattr__(self, "series", tuple(map(str, range(self.block.rows))))
 
     @property
     def count(self) -> int:
@@ -196,81 +173,72 @@ class Occurrences:
 
 
 class BlockProgram:
-    """A nonlinear program: minimise f(x; p) subject to bounds on x and g(x; p).
+    """The rows, objective and derivatives of a nonlinear program that is made of blocks.
 
     The parameters p are the shared numbers followed by the data of all occurrences.
 
     Args:
         size: Number of unknowns.
         occurrences: All blocks with their places; the rows of g follow their order.
-        shared_size: Number of shared numbers.
+        shared: The shared numbers.
     """
 
-    def __init__(self, size: int, occurrences: Sequence[Occurrences], shared_size: int) -> None:
+    def __init__(self, size: int, occurrences: Sequence[Occurrences], shared: np.ndarray) -> None:
         self.size = size
         self.occurrences = tuple(o for o in occurrences if o.count and o.block.matters)
-        self.shared_size = shared_size
-        self.lower = self._stack([o.lower for o in self.occurrences])
-        self.upper = self._stack([o.upper for o in self.occurrences])
+        self._shared = shared
         sizes = [o.block.rows * o.count for o in self.occurrences]
-        self._row_offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
-        data_sizes = [o.data.size for o in self.occurrences]
-        self._data_offsets = shared_size + np.concatenate([[0], np.cumsum(data_sizes)]).astype(int)
-
-    @staticmethod
-    def _stack(arrays: Sequence[np.ndarray]) -> np.ndarray:
-        return np.concatenate([array.ravel(order="F") for array in arrays] or [np.zeros(0)])
+        self._row_offsets = np.cumsum([0, *sizes])
+        self._data_offsets = np.cumsum([len(shared), *(o.data.size for o in self.occurrences)])
 
     @property
     def rows(self) -> int:
         """Number of constraint rows."""
         return int(self._row_offsets[-1])
 
-    def parameters(self, shared: np.ndarray) -> np.ndarray:
-        """Return the parameter vector p for these shared numbers."""
-        return np.concatenate([shared, self._stack([o.data for o in self.occurrences])])
-
-    def row_name(self, row: int) -> str:
-        """Return what a row of g is and where, e.g. "toe_l height in right_toe at 40 %"."""
-        name, where = self.row_place(row)
-        return f"{name} in {where}"
-
-    def row_place(self, row: int) -> tuple[str, str]:
-        """Return the name of a row of g and where it stands."""
-        which = int(np.searchsorted(self._row_offsets, row, side="right")) - 1
-        occurrence = self.occurrences[which]
-        instance, local = divmod(row - self._row_offsets[which], occurrence.block.rows)
-        return occurrence.row_names[local], occurrence.labels[instance]
-
-    def rows_of(self, block: Block | KeptBlock) -> np.ndarray:
-        """Return the rows of g that a block stands for, shape (rows, occurrences)."""
-        i = next(i for i, o in enumerate(self.occurrences) if o.block is block)
-        shape = (block.rows, self.occurrences[i].count)
-        return self._row_offsets[i] + np.arange(np.prod(shape)).reshape(shape, order="F")
+    @cached_property
+    def row_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled lower and upper bounds of all rows."""
+        lower = _stacked([o.lower for o in self.occurrences])
+        return lower, _stacked([o.upper for o in self.occurrences])
 
     @property
     def row_scale(self) -> np.ndarray:
         """Physical units per unit of every row."""
         return np.concatenate([np.tile(o.row_scale, o.count) for o in self.occurrences])
 
+    @property
+    def parameters(self) -> np.ndarray:
+        """The parameter vector p."""
+        return np.concatenate([self._shared, _stacked([o.data for o in self.occurrences])])
+
+    def row_place(self, i: int) -> tuple[str, str]:
+        """Return the name of a row of g and where it stands."""
+        which = int(np.searchsorted(self._row_offsets, i, side="right")) - 1
+        occurrence = self.occurrences[which]
+        instance, local = divmod(i - self._row_offsets[which], occurrence.block.rows)
+        return occurrence.row_names[local], occurrence.labels[instance]
+
+    def rows_of(self, block: Block) -> np.ndarray:
+        """Return the rows of g that a block stands for, shape (rows, occurrences)."""
+        i = next(i for i, o in enumerate(self.occurrences) if o.block is block)
+        return self._row_offsets[i] + _numbered((block.rows, self.occurrences[i].count))
+
+    @cached_property
     def functions(self) -> Mapping[str, ca.Function]:
-        """Return `nlp`, `grad_f`, `jac_g` and `hess_lag` in the form that `casadi.nlpsol` takes.
+        """`nlp`, `grad_f`, `jac_g` and `hess_lag` in the form that `casadi.nlpsol` takes.
 
         They live as long as this program or the mapping does; a solver alone does not keep them.
         """
-        return self._functions
-
-    def plain_functions(self) -> Mapping[str, ca.Function]:
-        """Return the same from expressions derived anew, for CasADi's virtual machine."""
-        return mapped_functions(self._assembly, [o.block.functions for o in self.occurrences])
-
-    @cached_property
-    def _functions(self) -> Mapping[str, ca.Function]:
         tapes = [o.block.tapes for o in self.occurrences] if kernels() is not None else [None]
         known = [of_block for of_block in tapes if of_block is not None]
         if len(known) < len(tapes):
             return self.plain_functions()
         return taped_functions(self._assembly, known)
+
+    def plain_functions(self) -> Mapping[str, ca.Function]:
+        """Return the same from expressions derived anew, for CasADi's virtual machine."""
+        return mapped_functions(self._assembly, [o.block.functions for o in self.occurrences])
 
     @cached_property
     def _assembly(self) -> Assembly:
@@ -282,12 +250,20 @@ class BlockProgram:
 
     def _sources(self, i: int, o: Occurrences) -> tuple[Source, ...]:
         """Return where the inputs of block i come from."""
-        data = np.arange(o.data.size).reshape(o.data.shape, order="F")
-        rows = np.arange(o.lower.size).reshape(o.lower.shape, order="F")
         return (
             Source("x", o.columns),
-            Source("p", self._data_offsets[i] + data),
-            Source("p", np.arange(self.shared_size)[:, None]),
+            Source("p", self._data_offsets[i] + _numbered(o.data.shape)),
+            Source("p", np.arange(len(self._shared))[:, None]),
             Source("lam_f", np.zeros((1, 1), int)),
-            Source("lam_g", self._row_offsets[i] + rows),
+            Source("lam_g", self._row_offsets[i] + _numbered(o.lower.shape)),
         )
+
+
+def _stacked(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    """Return arrays one after the other, each occurrence by occurrence."""
+    return np.concatenate([array.ravel(order="F") for array in arrays] or [np.zeros(0)])
+
+
+def _numbered(shape: tuple[int, ...]) -> np.ndarray:
+    """Return the places of an array in its stacked form, shape as given."""
+    return np.arange(np.prod(shape)).reshape(shape, order="F")

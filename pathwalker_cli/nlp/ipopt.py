@@ -2,30 +2,47 @@
 
 from __future__ import annotations
 
-import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from types import FrameType
-from typing import Any
+from typing import Any, Final
 
 import casadi as ca
 import numpy as np
 
+from pathwalker_cli.nlp.ma57 import ipopt_elimination, ma57_options
 from pathwalker_cli.nlp.machine import keep_freed_memory, use_one_blas_thread
+from pathwalker_cli.nlp.program import Program
 from pathwalker_cli.nlp.stage_ldl import stage_factors
-from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.nlp.watch import Observer, Watcher, interruptible
 
 __all__ = [
     "IpoptSettings",
     "Multipliers",
     "NlpResult",
     "NlpSolver",
-    "ProgressReport",
     "solve_program",
     "warm_pushes",
 ]
+
+_METHOD: Final = {
+    "mu_strategy": "monotone",
+    # programs come scaled; scaling by gradients at the start would depend on the start
+    "nlp_scaling_method": "none",
+    "linear_system_scaling": "none",
+    # a loose tolerance is no solution
+    "acceptable_iter": 0,
+    # where the compiled factors are not used
+    "linear_solver": "mumps",
+    "mumps_pivtol": 1e-4,
+}
+"""Options of all solves."""
+
+_BARRIER_DECREASE: Final = 0.05
+"""Of a cold start.  Barrier problems are only a path to the solution: few of them are enough."""
+
+_LARGEST_PUSH, _PUSH_SHARE = 1e-4, 0.1
+"""Warm starts on a bound are moved off it by about what the barrier would ask for: by this share of
+the barrier parameter, and no further than the first [solver units]."""
 
 
 @dataclass(frozen=True)
@@ -51,27 +68,19 @@ class IpoptSettings:
     def as_options(self) -> dict[str, Any]:
         """Return the options by their IPOPT name."""
         options: dict[str, Any] = {
+            **_METHOD,
             "print_level": 0,
             "sb": "yes",
             "tol": self.tolerance,
             "constr_viol_tol": self.constraint_tolerance,
-            "acceptable_iter": 0,
             "max_iter": self.max_iterations,
             "mu_init": self.initial_barrier,
-            "mu_strategy": "monotone",
-            "nlp_scaling_method": "none",
-            "linear_system_scaling": "none",
-            "linear_solver": "mumps",
-            "mumps_pivtol": 1e-4,
         }
-        if not self.warm_start:
-            # barrier problems are only a path to the solution: few of them are enough
-            options["mu_linear_decrease_factor"] = 0.05
-        else:
+        if self.warm_start:
             options["warm_start_init_point"] = "yes"
-            # a start on a bound is moved off it by about what the barrier would ask for
-            push = min(1e-4, 0.1 * self.initial_barrier)
-            options |= warm_pushes(push)
+            options |= warm_pushes(min(_LARGEST_PUSH, _PUSH_SHARE * self.initial_barrier))
+        else:
+            options["mu_linear_decrease_factor"] = _BARRIER_DECREASE
         return {**options, **self.extra}
 
 
@@ -88,22 +97,10 @@ class Multipliers:
     unknowns: np.ndarray
     rows: np.ndarray
 
-
-@dataclass(frozen=True)
-class ProgressReport:
-    """One iteration as it is shown.
-
-    Args:
-        iteration: Number of the iteration.
-        objective: Value of the objective.
-        infeasibility: Largest scaled violation of rows.
-        elapsed: Seconds since the solve began.
-    """
-
-    iteration: int
-    objective: float
-    infeasibility: float
-    elapsed: float
+    @property
+    def stacked(self) -> np.ndarray:
+        """Those of all unknowns and then of all rows, shape (n + m,)."""
+        return np.concatenate([self.unknowns, self.rows])
 
 
 @dataclass(frozen=True)
@@ -136,7 +133,7 @@ class NlpResult:
         return self.status == "converged"
 
 
-_REASONS = {
+_REASONS: Final = {
     "Solve_Succeeded": "converged",
     "Solved_To_Acceptable_Level": "stopped at a loose tolerance",
     "Infeasible_Problem_Detected": "no feasible point was found near the start",
@@ -150,75 +147,6 @@ _REASONS = {
     "Insufficient_Memory": "memory ran out",
 }
 
-Observer = Callable[[ProgressReport], None]
-
-
-class _Watcher(ca.Callback):
-    """Reports every iteration and stops when it is told to."""
-
-    def __init__(self, program: CollocationProgram, observer: Observer | None) -> None:
-        ca.Callback.__init__(self)
-        nlp = program.program
-        self._sizes = (nlp.size, nlp.rows, program.parameters.size)
-        self._observer = observer
-        self.begin(program)
-        self.construct("watcher", {})
-
-    def begin(self, program: CollocationProgram) -> None:
-        """Get ready for a solve with the bounds of this program."""
-        self._lower, self._upper = program.program.lower, program.program.upper
-        self._start = time.perf_counter()
-        self.iteration = -1
-        self.stop = False
-
-    def get_n_in(self) -> int:
-        return int(ca.nlpsol_n_out())
-
-    def get_n_out(self) -> int:
-        return 1
-
-    def get_name_in(self, i: int) -> str:
-        return str(ca.nlpsol_out(i))
-
-    def get_sparsity_in(self, i: int) -> ca.Sparsity:
-        size, rows, parameters = self._sizes
-        name = ca.nlpsol_out(i)
-        count = {"f": 1, "x": size, "lam_x": size, "g": rows, "lam_g": rows}.get(name, parameters)
-        return ca.Sparsity.dense(count)
-
-    def eval(self, arguments: Sequence[ca.DM]) -> list[int]:
-        self.iteration += 1
-        if self._observer is not None:
-            g = np.asarray(arguments[2]).ravel()
-            below, above = self._lower - g, g - self._upper
-            worst = max(below.max(initial=0.0), above.max(initial=0.0), 0.0)
-            elapsed = time.perf_counter() - self._start
-            report = ProgressReport(self.iteration, float(arguments[1]), float(worst), elapsed)
-            self._observer(report)
-        return [int(self.stop)]
-
-
-@contextmanager
-def _interruptible(watcher: _Watcher) -> Iterator[None]:
-    """Let Ctrl-C end the solve after the current iteration; a second one interrupts at once."""
-
-    def handler(number: int, frame: FrameType | None) -> None:
-        if watcher.stop:
-            if callable(previous):
-                previous(number, frame)
-            raise KeyboardInterrupt
-        watcher.stop = True
-
-    try:
-        previous = signal.signal(signal.SIGINT, handler)
-    except ValueError:  # not in the main thread: leave the signal alone
-        yield
-        return
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)
-
 
 class NlpSolver:
     """IPOPT for programs of one structure: built once, called with many numbers and starts.
@@ -231,20 +159,19 @@ class NlpSolver:
 
     def __init__(
         self,
-        program: CollocationProgram,
+        program: Program,
         settings: IpoptSettings,
         observer: Observer | None = None,
     ) -> None:
         use_one_blas_thread()
         keep_freed_memory()
         # held: IPOPT does not keep functions alive that are written in Python
-        self._functions = functions = program.program.functions()
-        self._watcher = _Watcher(program, observer)
-        self._factors = None
-        if program.elimination is not None and "linear_solver" not in settings.extra:
-            self._factors = stage_factors()
+        self._functions = functions = program.functions
+        self._watcher = Watcher(program, observer)
+        known = program.elimination_keys is not None and "linear_solver" not in settings.extra
+        self._factors = stage_factors() if known else None
         options: dict[str, Any] = {
-            "ipopt": settings.as_options() | (self._factors.ipopt_options if self._factors else {}),
+            "ipopt": settings.as_options() | (ma57_options() if self._factors else {}),
             "print_time": False,
             "error_on_fail": False,
             "iteration_callback": self._watcher,
@@ -256,7 +183,7 @@ class NlpSolver:
 
     def solve(
         self,
-        program: CollocationProgram,
+        program: Program,
         start: np.ndarray,
         multipliers: Multipliers | None = None,
     ) -> NlpResult:
@@ -270,34 +197,28 @@ class NlpSolver:
         Returns:
             The last iterate, converged or not.
         """
-        lower, upper = program.bounds
-        arguments: dict[str, Any] = {
-            "x0": start,
-            "p": program.parameters,
-            "lbx": lower,
-            "ubx": upper,
-            "lbg": program.program.lower,
-            "ubg": program.program.upper,
-        }
+        arguments: dict[str, Any] = {"x0": start, "p": program.parameters}
+        arguments |= dict(zip(("lbx", "ubx"), program.bounds, strict=True))
+        arguments |= dict(zip(("lbg", "ubg"), program.row_bounds, strict=True))
         if multipliers is not None:
             arguments |= {"lam_x0": multipliers.unknowns, "lam_g0": multipliers.rows}
         self._watcher.begin(program)
         began = time.perf_counter()
-        if self._factors is not None:
-            self._factors.begin(program.elimination)
-        with _interruptible(self._watcher):
+        elimination = ipopt_elimination(program) if self._factors else None
+        if self._factors and elimination:
+            self._factors.begin(elimination)
+        with interruptible(self._watcher):
             solution = self._solver(**arguments)
         seconds = time.perf_counter() - began
         stats = self._solver.stats()
         status = stats["return_status"]
+        arrays = {key: np.asarray(value).ravel() for key, value in solution.items()}
         return NlpResult(
             status=_REASONS.get(status, status.replace("_", " ").lower()),
-            unknowns=np.asarray(solution["x"]).ravel(),
-            rows=np.asarray(solution["g"]).ravel(),
+            unknowns=arrays["x"],
+            rows=arrays["g"],
             objective=float(solution["f"]),
-            multipliers=Multipliers(
-                np.asarray(solution["lam_x"]).ravel(), np.asarray(solution["lam_g"]).ravel()
-            ),
+            multipliers=Multipliers(arrays["lam_x"], arrays["lam_g"]),
             iterations=int(stats["iter_count"]),
             seconds=seconds,
             seconds_functions=sum(
@@ -307,7 +228,7 @@ class NlpSolver:
 
 
 def solve_program(
-    program: CollocationProgram,
+    program: Program,
     start: np.ndarray,
     settings: IpoptSettings,
     multipliers: Multipliers | None = None,

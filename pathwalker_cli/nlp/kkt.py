@@ -8,7 +8,7 @@ with H and J the second derivatives of the Lagrangian L and the first ones of th
 b the bounds that x and g press on.  S (multiplier / gap) and D (gap / multiplier) are what is left
 of the barrier at its end: an active bound moves x with it, an inactive one does nothing.
 
-The free parameters of the problem, the stiffnesses, are kept apart: the system is factorised with
+The free parameters of the program are kept apart: the system is factorised with
 them fixed, and what is left is the small Hessian of the optimal cost in them.
 
 References:
@@ -25,10 +25,9 @@ from typing import Any, Final
 import numpy as np
 from scipy import sparse
 
-from pathwalker_cli.nlp.elimination import in_order_of, stage_keys
 from pathwalker_cli.nlp.ipopt import NlpResult
-from pathwalker_cli.nlp.symmetric import SymmetricSystem
-from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.nlp.program import Program, limits
+from pathwalker_cli.nlp.stage_ldl import SymmetricSystem, in_order_of
 
 __all__ = ["Answer", "KktSystem"]
 
@@ -40,6 +39,9 @@ _DOUBTFUL: Final = 10.0
 
 _INACTIVE: Final = 1e-9
 """Ratio of multiplier and gap below which a row may be left out."""
+
+_LEAST_GAP: Final = 1e-12
+"""Gap that counts at least: the ratio stays finite where a bound is met exactly or missed."""
 
 
 @dataclass(frozen=True)
@@ -90,23 +92,22 @@ class KktSystem:
         result: Its solution; the tighter its tolerance, the clearer what is active.
     """
 
-    def __init__(self, program: CollocationProgram, result: NlpResult) -> None:
+    def __init__(self, program: Program, result: NlpResult) -> None:
         self.program = program
         self.result = result
-        self._functions = program.program.functions()
-        lower, upper = program.bounds
-        self._bound_ratio = _ratio(result.unknowns, lower, upper, result.multipliers.unknowns)
-        row_limits = program.program.lower, program.program.upper
-        row_ratio = _ratio(result.rows, *row_limits, result.multipliers.rows)
-        self._equality = row_limits[0] == row_limits[1]
-        self._rows = np.flatnonzero(self._equality | (row_ratio > _INACTIVE))
-        self._row_slack = np.where(self._equality, 0.0, 1.0 / np.maximum(row_ratio, _INACTIVE))
-        fixed = lower == upper
-        self.free = program.layout.parameters[~fixed[program.layout.parameters]]
+        self._functions = program.functions
+        n = program.size
+        values = np.concatenate([result.unknowns, result.rows])
+        self._ratios = _ratio(values, *limits(program), result.multipliers.stacked)
+        self._bound_ratio, row_ratio = self._ratios[:n], self._ratios[n:]
+        equality = np.equal(*program.row_bounds)
+        self._rows = np.flatnonzero(equality | (row_ratio > _INACTIVE))
+        self._row_slack = np.where(equality, 0.0, 1.0 / np.maximum(row_ratio, _INACTIVE))
+        fixed = np.equal(*program.bounds)
+        self.free = program.free_parameters[~fixed[program.free_parameters]]
         """Places of the free parameters."""
-        fixed[program.layout.parameters] = True
+        fixed[program.free_parameters] = True
         self._fixed, self._moving = np.flatnonzero(fixed), np.flatnonzero(~fixed)
-        self._ratios = np.concatenate([self._bound_ratio, row_ratio])
         self.active = int((self._ratios > 1.0).sum())
         """Number of active inequalities."""
         doubtful = (self._ratios > 1.0 / _DOUBTFUL) & (self._ratios < _DOUBTFUL)
@@ -124,7 +125,7 @@ class KktSystem:
         come = (theirs > _DOUBTFUL) & (mine < 1.0 / _DOUBTFUL)
         return int((gone | come).sum())
 
-    def answer(self, below: CollocationProgram, above: CollocationProgram, step: float) -> Answer:
+    def answer(self, below: Program, above: Program, step: float) -> Answer:
         """Return the derivatives by a number of the problem; free parameters follow it.
 
         Args:
@@ -193,7 +194,7 @@ class KktSystem:
         """Gradient of the Lagrangian without the bounds on the unknowns, shape (n,)."""
         return self._first_order(self.program)[1]
 
-    def _first_order(self, program: CollocationProgram) -> tuple[float, np.ndarray, np.ndarray]:
+    def _first_order(self, program: Program) -> tuple[float, np.ndarray, np.ndarray]:
         """Return objective, gradient of the Lagrangian and rows of a program at the optimum."""
         x, p = self.result.unknowns, program.parameters
         objective, gradient = self._functions["grad_f"](x, p)
@@ -202,26 +203,16 @@ class KktSystem:
         lagrangian = lagrangian + jacobian.sparse().T @ self.result.multipliers.rows
         return float(objective), lagrangian, np.asarray(rows).ravel()
 
-    def _change(self, below: CollocationProgram, above: CollocationProgram, step: float) -> _Change:
+    def _change(self, below: Program, above: Program, step: float) -> _Change:
         low, high = self._first_order(below), self._first_order(above)
         objective = (high[0] - low[0]) / (2 * step)
         gradient, rows = ((b - a) / (2 * step) for a, b in zip(low[1:], high[1:], strict=True))
-        multipliers = self.result.multipliers
-        row_bounds, bounds = (
-            (b - a) / (2 * step)
-            for a, b in zip(self._pressed(below), self._pressed(above), strict=True)
-        )
-        rows = rows - row_bounds
+        multipliers, size = self.result.multipliers, self.program.size
+        pressed = (_pressed(multipliers.stacked, *limits(k)) for k in (below, above))
+        moved = np.subtract(*reversed(list(pressed))) / (2 * step)
+        bounds, rows = moved[:size], rows - moved[size:]
         weighted = objective + multipliers.rows @ rows - multipliers.unknowns @ bounds
         return _Change(float(weighted), gradient, rows, bounds)
-
-    def _pressed(self, program: CollocationProgram) -> tuple[np.ndarray, np.ndarray]:
-        """Return the bounds that rows and unknowns press on; zero where there is none."""
-        result, limits = self.result, program.bounds
-        return (
-            _pressed(result.multipliers.rows, program.program.lower, program.program.upper),
-            _pressed(result.multipliers.unknowns, *limits),
-        )
 
     def _answer(self, change: _Change) -> Answer:
         """Return the derivatives, free parameters moving as `change.bounds` says."""
@@ -257,8 +248,9 @@ class KktSystem:
         h = hessian[self._moving][:, self._moving] + barrier
         a = jacobian[self._rows][:, self._moving]
         d = sparse.diags_array(-_REGULARISATION - self._row_slack[self._rows])
-        unknowns, rows = stage_keys(self.program)
-        order = in_order_of(np.concatenate([unknowns[self._moving], rows[self._rows]]))
+        order, keys = None, self.program.elimination_keys
+        if keys is not None:
+            order = in_order_of(np.concatenate([keys[0][self._moving], keys[1][self._rows]]))
         return SymmetricSystem(sparse.block_array([[h, a.T], [a, d]]), len(self._moving), order)
 
 
@@ -267,7 +259,7 @@ def _ratio(
 ) -> np.ndarray:
     """Return multiplier over gap of every inequality; 0 where the bounds leave no freedom."""
     gap = np.where(multipliers > 0.0, upper - values, values - lower)
-    ratio = np.abs(multipliers) / np.maximum(gap, 1e-12)
+    ratio = np.abs(multipliers) / np.maximum(gap, _LEAST_GAP)
     return np.asarray(np.where((upper > lower) & np.isfinite(gap), ratio, 0.0))
 
 

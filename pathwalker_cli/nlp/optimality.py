@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.nlp.ipopt import Multipliers
-from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.nlp.program import Program, limits
 
 __all__ = ["Optimality", "optimality"]
 
@@ -39,9 +39,7 @@ class Optimality:
     wrong_sign: float
 
 
-def optimality(
-    program: CollocationProgram, unknowns: np.ndarray, multipliers: Multipliers
-) -> Optimality:
+def optimality(program: Program, unknowns: np.ndarray, multipliers: Multipliers) -> Optimality:
     """Return how well a point and its multipliers meet the first-order conditions.
 
     Args:
@@ -49,19 +47,14 @@ def optimality(
         unknowns: Scaled unknowns.
         multipliers: Multipliers, positive at upper bounds.
     """
-    nlp = program.program
-    functions = nlp.plain_functions()
+    functions = program.plain_functions()
     cost, gradient = functions["grad_f"](unknowns, program.parameters)
     rows, jacobian = functions["jac_g"](unknowns, program.parameters)
     rows = np.asarray(rows).ravel()
     lagrangian = np.asarray(gradient).ravel() + jacobian.sparse().T @ multipliers.rows
     lagrangian = lagrangian + multipliers.unknowns
     values = np.concatenate([unknowns, rows])
-    lower, upper = (
-        np.concatenate([own, of_rows])
-        for own, of_rows in zip(program.bounds, (nlp.lower, nlp.upper), strict=True)
-    )
-    both = np.concatenate([multipliers.unknowns, multipliers.rows])
+    (lower, upper), both = limits(program), multipliers.stacked
     scale = max(_MEAN_MULTIPLIER, float(np.abs(both).mean())) / _MEAN_MULTIPLIER
     gap = np.where(both > 0.0, upper - values, values - lower)
     bounded = (lower < upper) & np.isfinite(gap)

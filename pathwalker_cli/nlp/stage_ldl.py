@@ -1,7 +1,7 @@
-"""The compiled linear solver that knows the order of elimination (native/stage_ldl.cpp).
+"""Solve large sparse symmetric indefinite systems in an order of elimination known beforehand.
 
-IPOPT finds linear solvers at run time by the names of the routines of HSL; the library answers to
-those of MA57.
+`StageFactors` are the compiled factors (`native/stage_ldl.cpp`), `SymmetricSystem` a system solved
+to the last digits by them, or by a library where they were not compiled.
 """
 
 from __future__ import annotations
@@ -14,15 +14,67 @@ from functools import cache
 from typing import Any, Final
 
 import numpy as np
+import qdldl
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, gmres, splu
 
-from pathwalker_cli.nlp.elimination import Elimination
-from pathwalker_cli.nlp.kernels import kernels, kernels_path
+from pathwalker_cli.nlp.kernels import kernels
 
-__all__ = ["FactorReport", "StageFactors", "stage_factors"]
+__all__ = [
+    "PIVOT_THRESHOLD",
+    "Elimination",
+    "FactorReport",
+    "StageFactors",
+    "SymmetricSystem",
+    "in_order_of",
+    "stage_factors",
+]
 
-_THRESHOLD: Final = 1e-6
-"""Least share of a column's largest entry that a pivot has; residuals are refined by IPOPT."""
+PIVOT_THRESHOLD: Final = 1e-6
+"""Least share of a column's largest entry that a pivot has; refinement makes up for weak pivots."""
+
+_REGULARISATIONS: Final = (1e-8, 1e-7, 1e-6, 1e-5)
+"""Added to the diagonal so that factors without pivoting exist; the first that does is taken."""
+
+_ACCURACY: Final = 1e-10
+"""Residual relative to the right hand side at which a solution is good."""
+
+_REFINEMENTS: Final = 30
+"""Most steps of refinement."""
+
+_GOOD_STEP: Final = 0.5
+"""Share of the residual that a good step of refinement leaves at most."""
+
+_GMRES: Final = {"rtol": 1e-13, "restart": 60, "maxiter": 3}
+"""Where plain refinement does not get there: as far as GMRES gets in 180 directions."""
+
+_GMRES_SLACK: Final = 1e3
+"""How many times the residual of a good solution its own may be."""
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """Order of elimination of a symmetric system of n unknowns.
+
+    Args:
+        order: All unknowns in the order of elimination, shape (n,).
+        ends: Where in `order` each group of unknowns ends, shape (groups,).
+    """
+
+    order: np.ndarray
+    ends: np.ndarray
+
+    def equals(self, other: Elimination) -> bool:
+        """Return whether order and groups are the same."""
+        mine, theirs = (self.order, self.ends), (other.order, other.ends)
+        return all(map(np.array_equal, mine, theirs))
+
+
+def in_order_of(keys: np.ndarray) -> Elimination:
+    """Return the order of unknowns with these keys of group and place within it, shape (n, 2)."""
+    order = np.lexsort(keys.T[::-1])
+    ends = np.append(np.flatnonzero(np.diff(keys[order, 0])) + 1, len(order))
+    return Elimination(order.astype(np.int32), ends.astype(np.int32))
 
 
 @cache
@@ -84,17 +136,8 @@ class StageFactors:
         self._solver = ctypes.c_void_p(None)
         self._free: Callable[[], Any] = lambda: None
 
-    @property
-    def ipopt_options(self) -> dict[str, Any]:
-        """Options that make IPOPT work with these factors."""
-        return {
-            "linear_solver": "ma57",
-            "hsllib": str(kernels_path()),
-            "ma57_pivtol": _THRESHOLD,
-        }
-
     def begin(self, elimination: Elimination) -> None:
-        """Get ready for a solve in this thread; what is known of an equal pattern is kept."""
+        """Answer to IPOPT in this thread; what is known of an equal pattern is kept."""
         self._order(elimination)
         self._library.stage_ldl_use(self._solver)
 
@@ -109,7 +152,7 @@ class StageFactors:
         if not known:
             raise ValueError("the order does not fit the matrix")
         values = np.ascontiguousarray(lower.data, float)
-        return bool(self._library.stage_ldl_factorise(self._solver, values, _THRESHOLD))
+        return bool(self._library.stage_ldl_factorise(self._solver, values, PIVOT_THRESHOLD))
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Return the solution for one right hand side, shape (n,)."""
@@ -124,11 +167,6 @@ class StageFactors:
         self._library.stage_ldl_report(self._solver, figures)
         return FactorReport(*figures.tolist())
 
-    @property
-    def negative(self) -> int:
-        """Number of negative eigenvalues of the last matrix."""
-        return int(self.report.negative)
-
     def _order(self, elimination: Elimination) -> None:
         if not self._elimination.equals(elimination):
             order, ends = elimination.order, elimination.ends
@@ -136,3 +174,61 @@ class StageFactors:
             self._solver, self._elimination = ctypes.c_void_p(solver), elimination
             self._free()
             self._free = weakref.finalize(self, self._library.stage_ldl_free, self._solver)
+
+
+class SymmetricSystem:
+    """Factors of a symmetric matrix [[H, A'], [A, -D]] with D >= 0.
+
+    The factors L D L' are those of the compiled solver, or those of a slightly regularised matrix.
+    Refinement with the matrix itself makes up for weak pivots and takes the regularisation out.
+
+    Args:
+        matrix: The matrix, shape (n, n).
+        positive: Number of leading rows that belong to H.
+        elimination: A good order of elimination, for the compiled solver; without it, or where it
+            was not compiled, the matrix is regularised.
+    """
+
+    def __init__(self, matrix: Any, positive: int, elimination: Elimination | None = None) -> None:
+        self._matrix = sparse.csc_array(matrix)
+        compiled = None if elimination is None else stage_factors()
+        self._factors: Any = compiled
+        if not (elimination and compiled and compiled.factorise(self._matrix, elimination)):
+            signs = np.where(np.arange(self._matrix.shape[0]) < positive, 1.0, -1.0)
+            self._factors = _regularised(self._matrix, signs)
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Return the solution for one right hand side, shape (n,)."""
+        goal = _ACCURACY * max(float(np.abs(right).max(initial=0.0)), 1e-300)
+        solution = np.zeros_like(right)
+        residual, worst = right, np.inf
+        for _ in range(_REFINEMENTS):
+            size = float(np.abs(residual).max(initial=0.0))
+            if size <= goal:
+                return solution
+            if size > _GOOD_STEP * worst:
+                break
+            solution = solution + self._factors.solve(residual)
+            residual, worst = right - self._matrix @ solution, size
+        return self._accelerated(right, goal)
+
+    def _accelerated(self, right: np.ndarray, goal: float) -> np.ndarray:
+        """Return the solution where plain refinement does not get there."""
+        size = self._matrix.shape
+        near = LinearOperator(size, matvec=lambda v: self._factors.solve(np.ravel(v)))
+        solution, _ = gmres(self._matrix, right, M=near, **_GMRES)
+        if np.abs(right - self._matrix @ solution).max() <= _GMRES_SLACK * goal:
+            return np.asarray(solution)
+        self._factors = splu(self._matrix)
+        return np.asarray(self._factors.solve(right))
+
+
+def _regularised(matrix: Any, signs: np.ndarray) -> Any:
+    """Return factors of nearly the same matrix, with more of these signs on its diagonal."""
+    for amount in _REGULARISATIONS:
+        regular = sparse.csc_matrix(matrix + sparse.diags_array(amount * signs))
+        try:
+            return qdldl.Solver(sparse.triu(regular, format="csc"), upper=True)
+        except RuntimeError:
+            continue
+    return splu(matrix)

@@ -1,10 +1,10 @@
 """Tapes of problem structures, kept on disk: a further process derives nothing again.
 
 A file holds the tapes of one structure.  Its name is a hash of all that tapes follow from: the
-sources of this package and its compiled libraries, byte by byte, the versions of the libraries that
-build expressions, and the structure itself.  Whatever changes, the name changes, so what is found
-is never stale.  That needs the sources on disk to be those that run: where one changed after the
-package was imported, nothing is read or kept.
+sources of this package and its compiled kernels, byte by byte, the versions of CasADi and NumPy,
+what else the caller says makes expressions, and the structure itself.  Whatever changes, the name
+changes, so what is found is never stale.  That needs the sources on disk to be those that run:
+where one changed after the package was imported, nothing is read or kept.
 """
 
 from __future__ import annotations
@@ -16,20 +16,18 @@ import os
 import tempfile
 from collections.abc import Hashable, Iterator, Mapping
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
 import casadi as ca
 import numpy as np
-import pinocchio as pin
 
 import pathwalker_cli
 from pathwalker_cli.nlp.kernels import kernels_path
 from pathwalker_cli.nlp.tape import Tape
 from pathwalker_cli.paths import source_stamps
 
-__all__ = ["KeptTapes", "cache_folder", "keep_tapes", "kept_files", "kept_tapes"]
+__all__ = ["KeptTapes", "Makers", "cache_folder", "keep_tapes", "kept_files", "kept_tapes"]
 
 _MOST_FILES: Final = 15
 """Structures that are kept; one takes some 10 MB."""
@@ -37,6 +35,10 @@ _SUFFIX: Final = ".tapes"
 _ABANDONED: Final = 3600.0
 """Age at which an unfinished file is sure to belong to no process any more [s]."""
 _SEAL: Final = hashlib.sha256().digest_size
+"""Bytes of the hash at the beginning of a file."""
+
+Makers = tuple[str | Path, ...]
+"""What else makes expressions: versions of libraries, and compiled libraries."""
 
 KeptTapes = Mapping[str, tuple[int, dict[str, Tape]]]
 """Number of rows, and tapes by kind, of every block that matters, by its name."""
@@ -62,9 +64,11 @@ def kept_files(folder: Path) -> list[Path]:
     return [file for _, file in sorted(used, reverse=True)]
 
 
-def kept_tapes(structure: Hashable) -> dict[str, tuple[int, dict[str, Tape]]] | None:
+def kept_tapes(
+    structure: Hashable, makers: Makers = ()
+) -> dict[str, tuple[int, dict[str, Tape]]] | None:
     """Return the tapes of all blocks of a structure, or None where they are not kept."""
-    path = _path(structure)
+    path = _path(structure, makers)
     if path is None or not path.is_file():  # a pipe would never end
         return None
     try:
@@ -78,9 +82,9 @@ def kept_tapes(structure: Hashable) -> dict[str, tuple[int, dict[str, Tape]]] | 
     return _unpacked(content)
 
 
-def keep_tapes(structure: Hashable, tapes: KeptTapes) -> None:
+def keep_tapes(structure: Hashable, tapes: KeptTapes, makers: Makers = ()) -> None:
     """Keep the tapes of all blocks of a structure; where that is not possible, do nothing."""
-    path = _path(structure)
+    path = _path(structure, makers)
     if path is None:
         return
     content = _packed(tapes)
@@ -106,44 +110,41 @@ def _tidy(newest: Path) -> None:
         file.unlink(missing_ok=True)
 
 
-def _path(structure: Hashable) -> Path | None:
+def _path(structure: Hashable, makers: Makers = ()) -> Path | None:
     """Return where the tapes of a structure belong; None where nothing may be read or kept."""
-    folder, makers = cache_folder(), _makers()
-    if folder is None or makers is None:
+    folder, made_by = cache_folder(), _made_by(makers)
+    if folder is None or made_by is None:
         return None
-    digest = hashlib.sha256(f"{makers}\n{structure!r}".encode())
+    digest = hashlib.sha256(f"{made_by}\n{structure!r}".encode())
     return folder / f"{digest.hexdigest()}{_SUFFIX}"
 
 
 @cache
-def _makers() -> str | None:
+def _made_by(makers: Makers = ()) -> str | None:
     """Return a hash of the code and the versions that make tapes.
 
     It is None where files changed since the import of the package: other code may be running.
     """
-    versions = (ca.CasadiMeta.version(), ca.CasadiMeta.git_revision(), pin.__version__)
-    digest = hashlib.sha256(" ".join((*versions, np.__version__)).encode())
-    package, count = Path(pathwalker_cli.__file__).parent, 0
+    versions = [ca.CasadiMeta.version(), ca.CasadiMeta.git_revision(), np.__version__]
+    versions += [maker for maker in makers if isinstance(maker, str)]
+    digest = hashlib.sha256(" ".join(versions).encode())
+    package = Path(pathwalker_cli.__file__).parent
     try:
         if source_stamps() != pathwalker_cli.SOURCES:
             return None
-        files = [(path, path.read_bytes()) for path in _maker_files(package)]
+        files = [(path, path.read_bytes()) for path in _maker_files(package, makers)]
     except OSError:
         return None
     for path, content in files:
         digest.update(f"{os.path.relpath(path, package)} {len(content)}\n".encode() + content)
-        count += 1
-    return digest.hexdigest() if count else None
+    return digest.hexdigest() if files else None
 
 
-def _maker_files(package: Path) -> Iterator[Path]:
+def _maker_files(package: Path, makers: Makers) -> Iterator[Path]:
     for folder, _, names in sorted(os.walk(package)):
         yield from (Path(folder, name) for name in sorted(names) if name.endswith(".py"))
-    extension = Path(
-        str(resources.files("pathwalker_cli.model.backends") / "libpinocchio_casadi.so")
-    )
-    for library in (extension, kernels_path()):
-        if library is not None and library.is_file():
+    for library in (*makers, kernels_path()):
+        if isinstance(library, Path) and library.is_file():
             yield library
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -28,7 +27,7 @@ def taped_functions(
         tapes: Tapes of all kinds by block.
     """
     runs = {
-        kind: [_run(assembly, i, kind, tape[kind]) for i, tape in enumerate(tapes)]
+        kind: _Runs([_run(assembly, i, kind, tape[kind]) for i, tape in enumerate(tapes)])
         for kind in KINDS
     }
     functions = {}
@@ -39,7 +38,7 @@ def taped_functions(
             wanted = [(kind, k) for k in range(len(outputs))]
             targets = [order.index(output) if output in order else None for output in wanted]
             if set(targets) != {None}:
-                terms.append(_Term(runs[kind], targets))
+                terms.append((runs[kind], targets))
         functions[name] = _TapedFunction(
             name,
             {argument: assembly.arguments[argument] for argument in arguments},
@@ -53,7 +52,7 @@ def _run(assembly: Assembly, i: int, kind: str, tape: Tape) -> _Run:
     """Return the tape of one kind of block i with its places."""
     part, arguments = assembly.parts[i], list(assembly.arguments)
     sources = part.inputs(kind)
-    return _Run(
+    return _Run.of(
         tape,
         [arguments.index(source.argument) for source in sources],
         [source.elements for source in sources],
@@ -62,8 +61,8 @@ def _run(assembly: Assembly, i: int, kind: str, tape: Tape) -> _Run:
     )
 
 
-class _NativeRun(ctypes.Structure):
-    """`Run` in `native/tape.cpp`."""
+class _Run(ctypes.Structure):
+    """A tape at all occurrences of its block: `Run` in `native/tape.cpp`."""
 
     _fields_ = (
         ("code", ctypes.c_void_p),
@@ -77,94 +76,79 @@ class _NativeRun(ctypes.Structure):
         ("wanted", ctypes.c_int64),
     )
 
+    @classmethod
+    def of(
+        cls,
+        tape: Tape,
+        sources: Sequence[int],
+        elements: Sequence[np.ndarray],
+        positions: Sequence[np.ndarray],
+        count: int,
+    ) -> _Run:
+        """Return the run of a tape.
 
-@dataclass(frozen=True)
-class _Run:
-    """A tape at all occurrences of its block.
-
-    Args:
-        tape: The tape.
-        sources: Which vector each input is read from.
-        elements: Elements of the source, shape (nnz, count) or (nnz, 1), by input.
-        positions: Nonzeros of the results that outputs are added to, shape (nnz, count), by output.
-        count: Number of occurrences.
-    """
-
-    tape: Tape
-    sources: Sequence[int]
-    elements: Sequence[np.ndarray]
-    positions: Sequence[np.ndarray]
-    count: int
-
-    @cached_property
-    def code(self) -> np.ndarray:
-        """Instructions whose INPUT names the source."""
-        code = self.tape.code.copy()
+        Args:
+            tape: The tape.
+            sources: Which vector each input is read from.
+            elements: Elements of the source, shape (nnz, count) or (nnz, 1), by input.
+            positions: Nonzeros of the results that outputs are added to, shape (nnz, count), by
+                output.
+            count: Number of occurrences.
+        """
+        code = tape.code.copy()
         reads = code[:, 0] == INPUT
-        code[reads, 2] = np.array(self.sources)[code[reads, 2]]
-        return code
-
-    @cached_property
-    def gather(self) -> np.ndarray:
-        """Elements of the sources, int32 of shape (groups, k, lanes)."""
-        return self._table(self.elements, self.tape.inputs)
-
-    @cached_property
-    def scatter(self) -> np.ndarray:
-        """Positions in the results, int32 of shape (groups, l, lanes)."""
-        return self._table(self.positions, self.tape.outputs)
-
-    def _table(self, places: Sequence[np.ndarray], rows: np.ndarray) -> np.ndarray:
-        groups = -(-self.count // LANES)
-        table = np.empty((len(rows), groups * LANES), np.int32)
-        for k, place in enumerate(places):
-            mine = rows[:, 0] == k
-            # the last lanes, and those of shared numbers, repeat the last occurrence
-            columns = np.minimum(np.arange(groups * LANES), place.shape[1] - 1)
-            table[mine] = place[rows[mine, 1]][:, columns]
-        return np.ascontiguousarray(table.reshape(len(rows), groups, LANES).swapaxes(0, 1))
-
-    @cached_property
-    def native(self) -> _NativeRun:
-        """The same for the interpreter, which reads the arrays of this object."""
-        wanted = sum(1 << k for k, positions in enumerate(self.positions) if positions.size)
-        return _NativeRun(
-            *(array.ctypes.data for array in (self.code, self.gather, self.scatter)),
-            len(self.code),
-            self.count,
-            len(self.tape.inputs),
-            len(self.tape.outputs),
-            self.tape.registers,
-            wanted,
+        code[reads, 2] = np.array(sources)[code[reads, 2]]
+        tables = (_table(elements, tape.inputs, count), _table(positions, tape.outputs, count))
+        run = cls(
+            *(array.ctypes.data for array in (code, *tables)),
+            len(code),
+            count,
+            len(tape.inputs),
+            len(tape.outputs),
+            tape.registers,
+            sum(1 << k for k, places in enumerate(positions) if places.size),
         )
+        run.arrays = (code, *tables)  # kept alive: the fields only point at them
+        return run
 
 
-@dataclass(frozen=True)
-class _Term:
-    """What tapes of one kind add to the results of a function.
+def _table(places: Sequence[np.ndarray], rows: np.ndarray, count: int) -> np.ndarray:
+    """Return elements or positions in the order of reading, int32 of shape (groups, k, lanes)."""
+    groups = -(-count // LANES)
+    table = np.empty((len(rows), groups * LANES), np.int32)
+    for k, place in enumerate(places):
+        mine = rows[:, 0] == k
+        # the last lanes, and those of shared numbers, repeat the last occurrence
+        columns = np.minimum(np.arange(groups * LANES), place.shape[1] - 1)
+        table[mine] = place[rows[mine, 1]][:, columns]
+    return np.ascontiguousarray(table.reshape(len(rows), groups, LANES).swapaxes(0, 1))
 
-    Args:
-        runs: The tapes.
-        targets: Which result each output of the tapes is added to; None where to none.
-    """
 
-    runs: Sequence[_Run]
-    targets: Sequence[int | None]
+class _Runs:
+    """Tapes that add to the same results."""
 
-    @cached_property
-    def native(self) -> ctypes.Array[_NativeRun]:
-        """The runs for the interpreter."""
-        return (_NativeRun * len(self.runs))(*(run.native for run in self.runs))
+    def __init__(self, runs: Sequence[_Run]) -> None:
+        self._runs = runs  # they keep what the copies in the array point at
+        self._array = (_Run * len(runs))(*runs)
+
+    def __call__(
+        self, sources: ctypes.Array[ctypes.c_void_p], results: Sequence[np.ndarray | None]
+    ) -> None:
+        """Add every output to its result, but for those without one."""
+        _interpreter()(self._array, len(self._runs), sources, _pointers(results), len(results))
 
 
 class _TapedFunction(ca.Callback):
     """A CasADi function that sums what tapes say; it must outlive every solver that uses it.
 
+    Relied on, of CasADi 3.8: `eval_buffer` gets dense numbers, None for an argument of zeros and
+    for a result that is not wanted; and `nlpsol` asks for no derivative of what says it has none.
+
     Args:
         name: Its name.
         arguments: Lengths of the arguments by name; sources are counted in this order.
         results: Patterns of the results by name.
-        terms: What is summed.
+        terms: What is summed: tapes, and which result each of their outputs is added to.
     """
 
     def __init__(
@@ -172,12 +156,12 @@ class _TapedFunction(ca.Callback):
         name: str,
         arguments: Mapping[str, int],
         results: Mapping[str, ca.Sparsity],
-        terms: Sequence[_Term],
+        terms: Sequence[tuple[_Runs, Sequence[int | None]]],
     ) -> None:
         ca.Callback.__init__(self)
         self._arguments = list(arguments.items())
         self._results = list(results.items())
-        self._terms = [(term, term.native) for term in terms]
+        self._terms = terms
         self._zeros = [np.zeros(max(size, 1)) for size in arguments.values()]
         # `nlpsol` prepares the gradient of the Lagrangian, which nobody evaluates: derivatives
         # have functions of their own
@@ -215,9 +199,8 @@ class _TapedFunction(ca.Callback):
             if total is not None:
                 total.fill(0.0)
         sources = _pointers(given)
-        for term, runs in self._terms:
-            wanted = [None if k is None else sums[k] for k in term.targets]
-            _run_tapes()(runs, len(runs), sources, _pointers(wanted), len(wanted))
+        for runs, targets in self._terms:
+            runs(sources, [None if k is None else sums[k] for k in targets])
         return 0
 
 
@@ -231,7 +214,7 @@ class Columns:
     def __init__(self, function: ca.Function) -> None:
         self._function = function
         self._tape = Tape.of(function)
-        self._prepared: dict[int, _Term] = {}
+        self._prepared: dict[int, _Runs] = {}
 
     def __call__(self, *points: np.ndarray) -> list[np.ndarray]:
         """Return the outputs at m points, shape (rows, columns * m) each.
@@ -247,11 +230,10 @@ class Columns:
         given = [np.ascontiguousarray(point, float) for point in points]
         shapes = [self._function.size_out(k) for k in range(self._function.n_out())]
         outputs = [np.zeros((rows, columns * count)) for rows, columns in shapes]
-        runs = self._prepared[count].native
-        _run_tapes()(runs, len(runs), _pointers(given), _pointers(outputs), len(outputs))
+        self._prepared[count](_pointers(given), outputs)
         return outputs
 
-    def _at(self, tape: Tape, count: int) -> _Term:
+    def _at(self, tape: Tape, count: int) -> _Runs:
         """Return the tape with the places of m points."""
         function, point = self._function, np.arange(count)
         elements = [
@@ -264,12 +246,11 @@ class Columns:
             )
             width = function.size2_out(k)
             positions.append(rows * width * count + point * width + columns)
-        run = _Run(tape, range(len(elements)), elements, positions, count)
-        return _Term([run], list(range(len(positions))))
+        return _Runs([_Run.of(tape, range(len(elements)), elements, positions, count)])
 
 
 @cache
-def _run_tapes() -> Any:
+def _interpreter() -> Any:
     """Return the interpreter."""
     library = kernels()
     if library is None:

@@ -13,12 +13,12 @@ from functools import partial
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.nlp.blocks import Block, KeptBlock
+from pathwalker_cli.nlp.blocks import Block, Expressions
 from pathwalker_cli.nlp.frozen import FrozenTerms
 from pathwalker_cli.nlp.tape import Tape
 from pathwalker_cli.ocp.phased import collocation_times, lagrange_weights, quadrature_weights
 from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase
-from pathwalker_cli.ocp.unknowns import Unknown, boundary_block
+from pathwalker_cli.ocp.transcription import Unknown, boundary_expressions
 
 __all__ = ["CollocationBlocks"]
 
@@ -33,10 +33,10 @@ def _differentiation(degree: int) -> np.ndarray:
 class _PhaseBlocks:
     """The blocks of one phase: rows at a point, within an interval, at the last instant."""
 
-    residual: Block | KeptBlock
-    path: Block | KeptBlock
-    end: Block | KeptBlock
-    interval: Block | KeptBlock
+    residual: Block
+    path: Block
+    end: Block
+    interval: Block
 
 
 class CollocationBlocks:
@@ -57,19 +57,17 @@ class CollocationBlocks:
         self.problem = problem
         self.degree = degree
         self._kept = kept
-        self.blocks: list[Block | KeptBlock] = []
+        self.blocks: list[Block] = []
         self.phases = tuple(self._phase_blocks(phase) for phase in problem.phases)
         self.node = self._block("node", self._node_block)
-        boundary = partial(boundary_block, problem, problem.controls)
-        self.boundary = self._block("boundary", boundary)
+        ends = partial(boundary_expressions, problem, problem.controls)
+        self.boundary = self._block("boundary", ends)
         self.sample = self._block("sample", self._sample_block)
 
-    def _block(self, name: str, build: Callable[[], Block]) -> Block | KeptBlock:
+    def _block(self, name: str, build: Callable[[], Expressions]) -> Block:
         """Return a block of this name, and note it."""
-        if self._kept is None:
-            self.blocks.append(build())
-        else:
-            self.blocks.append(KeptBlock(name, *self._kept.get(name, (0, {})), build))
+        kept = None if self._kept is None else self._kept.get(name, (0, {}))
+        self.blocks.append(Block(name, build, kept))
         return self.blocks[-1]
 
     def _phase_blocks(self, phase: Phase) -> _PhaseBlocks:
@@ -80,7 +78,7 @@ class CollocationBlocks:
         interval = self._block(f"{phase.name}_interval", partial(self._interval_block, phase))
         return _PhaseBlocks(**points, interval=interval)
 
-    def _point_block(self, phase: Phase, kind: str) -> Block:
+    def _point_block(self, phase: Phase, kind: str) -> Expressions:
         """Return rows at one collocation point; unknowns T, p, x, z, y0, u0, u1."""
         problem, rows = self.problem, getattr(phase, kind)
         duration, fraction, at = ca.SX.sym("T"), ca.SX.sym("fraction"), ca.SX.sym("at")
@@ -93,11 +91,10 @@ class CollocationBlocks:
         y = y0.value + duration * fraction * at * (u0.value + at / 2 * rise)
         u = u0.value + at * rise
         values = [x.value, z.value, y, u, p.value, problem.shared, problem.point_data]
-        (result,), frozen = self._substituted(phase, [rows.value / rows.scale], values, "")
+        (result,), frozen = problem.substituted(phase, [rows.value / rows.scale], values)
         unknowns = [duration, *(k.scaled for k in (p, x, z, y0, u0, u1))]
         data = ca.vertcat(fraction, at, problem.point_data)
-        name = f"{phase.name}_{kind}"
-        return Block(name, ca.vertcat(*unknowns), data, problem.shared, result, frozen=frozen)
+        return Expressions(ca.vertcat(*unknowns), data, problem.shared, result, frozen=frozen)
 
     def _unknowns(self, phase: Phase, tag: str) -> tuple[Unknown, Unknown, Unknown]:
         return (
@@ -106,32 +103,7 @@ class CollocationBlocks:
             Unknown.of(phase.algebraic, f"z{tag}"),
         )
 
-    def _substituted(
-        self, phase: Phase, expressions: list[ca.SX], values: list[ca.SX], tag: str
-    ) -> tuple[list[ca.SX], FrozenTerms]:
-        """Return a phase's expressions with its symbols replaced by values."""
-        problem = self.problem
-        symbols = [
-            problem.states.symbol,
-            phase.algebraic.symbol,
-            problem.smooth.symbol,
-            problem.controls.symbol,
-            problem.parameters.symbol,
-            problem.shared,
-            problem.point_data,
-        ]
-        frozen = phase.frozen
-        inputs = [*symbols, frozen.symbol_vector]
-        outer = ca.Function("expressions", inputs, expressions)
-        if not any(ca.depends_on(k, frozen.symbol_vector) for k in expressions if k.numel()):
-            unused = ca.SX.zeros(frozen.symbol_vector.numel())
-            return outer.call([*values, unused], True, False), FrozenTerms()
-        inner = ca.Function("meanings", symbols, [frozen.meaning_vector])
-        renewed = ca.SX.sym(f"frozen{tag}", frozen.symbol_vector.numel())
-        (meanings,) = inner.call(values, True, False)
-        return outer.call([*values, renewed], True, False), FrozenTerms([renewed], [meanings])
-
-    def _interval_block(self, phase: Phase) -> Block:
+    def _interval_block(self, phase: Phase) -> Expressions:
         """Return collocation, smooth-state and integral rows of one interval.
 
         Unknowns T, p, x0, (x_k, z_k) for all points, y0, u0, s0, y1, u1, s1.
@@ -153,7 +125,7 @@ class CollocationBlocks:
             values = [x.value, z.value, y, u0.value + times[k] * rise, p.value]
             values += [problem.shared, data[k]]
             expressions = [phase.derivative, phase.integrands]
-            (derivative, integrands), more = self._substituted(phase, expressions, values, str(k))
+            (derivative, integrands), more = problem.substituted(phase, expressions, values, str(k))
             slope = differentiation[k, 0] * x0.scaled
             for j, (other, _) in enumerate(points):
                 slope += differentiation[k, j + 1] * other.scaled
@@ -166,8 +138,7 @@ class CollocationBlocks:
         unknowns = [duration, p.scaled, x0.scaled]
         unknowns += [k.scaled for pair in points for k in pair]
         unknowns += [k.scaled for k in (y0, u0, s0, y1, u1, s1)]
-        return Block(
-            f"{phase.name}_interval",
+        return Expressions(
             ca.vertcat(*unknowns),
             ca.vertcat(fraction, *data),
             problem.shared,
@@ -184,7 +155,7 @@ class CollocationBlocks:
             Unknown(symbol, symbol * problem.integral_scale),
         )
 
-    def _node_block(self) -> Block:
+    def _node_block(self) -> Expressions:
         """Return the rows in y and u at a mesh node."""
         problem, rows = self.problem, self.problem.node_rows
         y, u, _ = self._node("")
@@ -192,9 +163,9 @@ class CollocationBlocks:
         outer = ca.Function("node", symbols, [rows.value / rows.scale])
         value = outer(y.value, u.value, problem.shared)
         unknowns = ca.vertcat(y.scaled, u.scaled)
-        return Block("node", unknowns, ca.SX(0, 1), problem.shared, value)
+        return Expressions(unknowns, ca.SX(0, 1), problem.shared, value)
 
-    def _sample_block(self) -> Block:
+    def _sample_block(self) -> Expressions:
         """Return the objective at an instant inside an interval.
 
         Unknowns x0 and x at all points; data are their interpolation weights and the point data.
@@ -206,4 +177,4 @@ class CollocationBlocks:
         (cost,) = ca.substitute([problem.sample], [problem.states.symbol], [value])
         unknowns = ca.vertcat(*(x.scaled for x in states))
         data = ca.vertcat(weights, problem.point_data)
-        return Block("sample", unknowns, data, problem.shared, ca.SX(0, 1), cost)
+        return Expressions(unknowns, data, problem.shared, ca.SX(0, 1), cost)

@@ -1,20 +1,137 @@
-"""Where every unknown of a collocation program stands in its vector."""
+"""Where every unknown of a transcribed problem stands in its vector."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Final, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from pathwalker_cli.ocp.problem import BoundTable, MultiPhaseProblem
-from pathwalker_cli.ocp.unknowns import PlaceBook
+from pathwalker_cli.ocp.problem import BoundTable, MultiPhaseProblem, Variables
 
-__all__ = ["Layout", "PhasePlaces"]
+__all__ = ["NODE", "Bounded", "Layout", "PhasePlaces", "PlaceBook", "collocation_layout"]
+
+NODE: Final = ("states", "smooth", "controls", "integrals")
+"""What stands at every node of collocation, in this order."""
+
+P = TypeVar("P")
+
+
+class Bounded(NamedTuple):
+    """Places of unknowns, and under which names, phase and end their bounds are looked up."""
+
+    places: np.ndarray
+    names: tuple[str, ...]
+    phase: str = ""
+    end: bool = False
+
+
+@dataclass(frozen=True)
+class Layout(Generic[P]):
+    """Places of all unknowns, ordered by time; P tells the places of one phase.
+
+    Nodes are those of the mesh; of multiple shooting, the ends of all steps but for the controls.
+
+    Args:
+        scale: Physical units per solver unit, shape (n,).
+        names: Name of every unknown and where it stands, n pairs.
+        durations: Phase durations, shape (phases,).
+        parameters: Free parameters, shape (np,).
+        states: x at the nodes, shape (nodes, nx).
+        smooth: y at the nodes, shape (nodes, ny).
+        controls: Controls at the nodes of the mesh, shape (mesh nodes, nu).
+        integrals: Running costs at the nodes, shape (nodes, ni).
+        phases: Places of each phase.
+    """
+
+    scale: np.ndarray
+    names: tuple[tuple[str, str], ...]
+    durations: np.ndarray
+    parameters: np.ndarray
+    states: np.ndarray
+    smooth: np.ndarray
+    controls: np.ndarray
+    integrals: np.ndarray
+    phases: tuple[P, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns n."""
+        return len(self.scale)
+
+    def bounds(
+        self, problem: MultiPhaseProblem, table: BoundTable, others: Iterable[Bounded]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return scaled bounds of all unknowns: durations, parameters, first states, and others.
+
+        Running costs begin with 0; what is not named is free.
+        """
+        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        lengths = [
+            Bounded(self.durations[i : i + 1], ("duration",), one.name)
+            for i, one in enumerate(problem.phases)
+        ]
+        parameters = Bounded(self.parameters, problem.parameters.names)
+        first = Bounded(self.states[0], problem.states.names, "first")
+        for places, names, phase, end in (parameters, *lengths, *others, first):
+            lower[places], upper[places] = table.arrays(names, phase, end)
+        lower[self.integrals[0]] = upper[self.integrals[0]] = 0.0
+        return lower / self.scale, upper / self.scale
+
+
+class PlaceBook:
+    """Hands out places of unknowns one after the other, those that stand once first.
+
+    Args:
+        problem: The problem.
+        controls: What stands in the place of its controls.
+    """
+
+    def __init__(self, problem: MultiPhaseProblem, controls: Variables) -> None:
+        self._scale: list[float] = []
+        self._names: list[tuple[str, str]] = []
+        self._kinds = {
+            "states": (problem.states.names, problem.states.scale),
+            "smooth": (problem.smooth.names, problem.smooth.scale),
+            "controls": (controls.names, controls.scale),
+            "integrals": (problem.integrals, problem.integral_scale),
+        }
+        durations = [self._places(("duration",), np.ones(1), p.name) for p in problem.phases]
+        self._durations = np.concatenate(durations)
+        self._parameters = self.take(problem.parameters, "all phases")
+        self.nodes: dict[str, list[np.ndarray]] = {kind: [] for kind in self._kinds}
+
+    def _places(self, names: tuple[str, ...], scale: np.ndarray, where: str) -> np.ndarray:
+        start = len(self._scale)
+        self._scale += scale.tolist()
+        self._names += [(name, where) for name in names]
+        return np.arange(start, len(self._scale))
+
+    def take(self, variables: Variables, where: str) -> np.ndarray:
+        """Return places for these unknowns."""
+        return self._places(variables.names, variables.scale, where)
+
+    def take_node(self, where: str, *kinds: str) -> None:
+        """Note places at a further node for these of states, smooth, controls and integrals."""
+        for kind in kinds:
+            self.nodes[kind].append(self._places(*self._kinds[kind], where))
+
+    def layout(self, phases: Iterable[P]) -> Layout[P]:
+        """Return the places of all unknowns."""
+        return Layout(
+            scale=np.array(self._scale),
+            names=tuple(self._names),
+            durations=self._durations,
+            parameters=self._parameters,
+            phases=tuple(phases),
+            **{kind: np.array(places) for kind, places in self.nodes.items()},
+        )
 
 
 @dataclass(frozen=True)
 class PhasePlaces:
-    """Places of one phase with N intervals of d points.
+    """Places of one phase of collocation with N intervals of d points.
 
     Args:
         nodes: Node numbers, shape (N + 1,).
@@ -27,122 +144,20 @@ class PhasePlaces:
     algebraic: np.ndarray
 
 
-@dataclass(frozen=True)
-class Layout:
-    """Places of all unknowns, ordered by time.
-
-    Args:
-        size: Number of unknowns.
-        scale: Physical units per solver unit, shape (size,).
-        names: Name of every unknown, for reports.
-        durations: Phase durations, shape (phases,).
-        parameters: Free parameters, shape (np,).
-        states: x at the nodes, shape (nodes, nx).
-        smooth: y at the nodes, shape (nodes, ny).
-        controls: u at the nodes, shape (nodes, nu).
-        integrals: Running costs at the nodes, shape (nodes, ni).
-        phases: Places of each phase.
-    """
-
-    size: int
-    scale: np.ndarray
-    names: tuple[str, ...]
-    durations: np.ndarray
-    parameters: np.ndarray
-    states: np.ndarray
-    smooth: np.ndarray
-    controls: np.ndarray
-    integrals: np.ndarray
-    phases: tuple[PhasePlaces, ...]
-
-    @classmethod
-    def make(
-        cls, problem: MultiPhaseProblem, meshes: tuple[np.ndarray, ...], degree: int
-    ) -> Layout:
-        """Return the layout of a problem on a mesh."""
-        return _Builder(problem).build(meshes, degree)
-
-    def bounds(
-        self, problem: MultiPhaseProblem, table: BoundTable
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return scaled lower and upper bounds of all unknowns."""
-        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
-
-        def put(
-            places: np.ndarray, names: tuple[str, ...], phase: str = "", end: bool = False
-        ) -> None:
-            low, high = table.arrays(names, phase, end)
-            lower[places], upper[places] = low, high
-
-        put(self.parameters, problem.parameters.names)
-        put(self.smooth, problem.smooth.names)
-        put(self.controls, problem.controls.names)
-        for i, (phase, places) in enumerate(zip(problem.phases, self.phases, strict=True)):
-            put(self.durations[i : i + 1], ("duration",), phase.name)
-            put(places.inner_states, problem.states.names, phase.name)
-            put(places.algebraic, phase.algebraic.names, phase.name)
-            put(places.algebraic[-1, -1], phase.algebraic.names, phase.name, end=True)
-        put(self.states[0], problem.states.names, "first")
-        put(self.integrals, problem.integrals)
-        lower[self.integrals[0]] = upper[self.integrals[0]] = 0.0
-        return lower / self.scale, upper / self.scale
-
-
-class _Builder(PlaceBook):
-    """Hands out places in the order of time."""
-
-    def __init__(self, problem: MultiPhaseProblem) -> None:
-        super().__init__()
-        self.problem = problem
-
-    def build(self, meshes: tuple[np.ndarray, ...], degree: int) -> Layout:
-        problem = self.problem
-        durations = np.concatenate(
-            [self.take(("duration",), np.ones(1), phase.name) for phase in problem.phases]
-        )
-        parameters = self.take(problem.parameters.names, problem.parameters.scale, "all phases")
-        nodes = [self._node(f"{problem.phases[0].name} at 0 % of the phase")]
-        phases = []
-        for phase, mesh in zip(problem.phases, meshes, strict=True):
-            first, inner, algebraic = len(nodes) - 1, [], []
-            for n in range(len(mesh) - 1):
-                where = f"{phase.name} at {100 * mesh[n + 1]:.0f} % of the phase"
-                points = [
-                    self.take(problem.states.names, problem.states.scale, where)
-                    for _ in range(degree - 1)
-                ]
-                algebraic.append(
-                    [
-                        self.take(phase.algebraic.names, phase.algebraic.scale, where)
-                        for _ in range(degree)
-                    ]
-                )
-                nodes.append(self._node(where))
-                inner.append([*points, nodes[-1][0]])
-            numbers = np.arange(first, len(nodes))
-            phases.append(PhasePlaces(numbers, np.array(inner), np.array(algebraic)))
-        states, smooth, controls, integrals = (
-            np.array([node[k] for node in nodes]) for k in range(4)
-        )
-        return Layout(
-            len(self.scale),
-            np.array(self.scale),
-            tuple(self.names),
-            durations,
-            parameters,
-            states,
-            smooth,
-            controls,
-            integrals,
-            tuple(phases),
-        )
-
-    def _node(self, where: str) -> tuple[np.ndarray, ...]:
-        """Return places of x, y, u and the running costs of a node."""
-        p = self.problem
-        return (
-            self.take(p.states.names, p.states.scale, where),
-            self.take(p.smooth.names, p.smooth.scale, where),
-            self.take(p.controls.names, p.controls.scale, where),
-            self.take(p.integrals, p.integral_scale, where),
-        )
+def collocation_layout(
+    problem: MultiPhaseProblem, meshes: tuple[np.ndarray, ...], degree: int
+) -> Layout[PhasePlaces]:
+    """Return the places of all unknowns of collocation."""
+    book, phases = PlaceBook(problem, problem.controls), []
+    book.take_node(f"{problem.phases[0].name} at 0 % of the phase", *NODE)
+    for phase, mesh in zip(problem.phases, meshes, strict=True):
+        first, inner, algebraic = len(book.nodes["states"]) - 1, [], []
+        for end in mesh[1:]:
+            where = f"{phase.name} at {100 * end:.0f} % of the phase"
+            points = [book.take(problem.states, where) for _ in range(degree - 1)]
+            algebraic.append([book.take(phase.algebraic, where) for _ in range(degree)])
+            book.take_node(where, *NODE)
+            inner.append([*points, book.nodes["states"][-1]])
+        nodes = np.arange(first, len(book.nodes["states"]))
+        phases.append(PhasePlaces(nodes, np.array(inner), np.array(algebraic)))
+    return book.layout(phases)

@@ -33,18 +33,21 @@ def transferred(
 def _of_rows(old: CollocationProgram, values: np.ndarray, new: CollocationProgram) -> np.ndarray:
     """Return multipliers of the rows, block by block."""
     parts, offset = [], 0
-    for before, after in zip(old.program.occurrences, new.program.occurrences, strict=True):
-        size = before.block.rows * before.count
-        block = values[offset : offset + size].reshape(before.block.rows, before.count, order="F")
-        offset += size
-        result = np.zeros((after.block.rows, after.count))
-        for series in set(before.series):
-            rows = [k for k, name in enumerate(before.series) if name == series]
-            new_rows = [k for k, name in enumerate(after.series) if name == series]
-            result[new_rows] = _resample(
-                before.times[rows], block[rows], before.weights[rows],
-                after.times[new_rows], after.weights[new_rows],
-            )  # fmt: skip
+    for before, after in zip(old.occurrences, new.occurrences, strict=True):
+        rows = before.block.rows
+        times, weights = (np.broadcast_to(k, (rows, before.count))
+                          for k in (before.times, before.weights))  # fmt: skip
+        new_times, new_weights = (np.broadcast_to(k, (rows, after.count))
+                                  for k in (after.times, after.weights))  # fmt: skip
+        block = values[offset : offset + times.size].reshape(times.shape, order="F")
+        offset += times.size
+        result = np.zeros(new_times.shape)
+        series = np.array(before.series or range(rows))
+        for one in set(series.tolist()):
+            at = series == one
+            result[at] = _resample(
+                times[at], block[at], weights[at], new_times[at], new_weights[at]
+            )
         parts.append(result.ravel(order="F"))
     return np.concatenate(parts)
 

@@ -132,7 +132,7 @@ class Phase:
     end: Rows
     fixed_at_end: tuple[str, ...]
     integrands: ca.SX
-    frozen: FrozenTerms
+    frozen: FrozenTerms = field(default_factory=FrozenTerms)
 
 
 @dataclass(frozen=True)
@@ -188,6 +188,32 @@ class MultiPhaseProblem:
     node_rows: Rows
     boundary: Boundary
     sample: ca.SX = field(default_factory=lambda: ca.SX(0))
+
+    def inputs(self, phase: Phase) -> list[ca.SX]:
+        """Return the symbols x, z, y, u, p, shared, point data in the expressions of a phase."""
+        return [
+            self.states.symbol,
+            phase.algebraic.symbol,
+            self.smooth.symbol,
+            self.controls.symbol,
+            self.parameters.symbol,
+            self.shared,
+            self.point_data,
+        ]
+
+    def substituted(
+        self, phase: Phase, expressions: list[ca.SX], values: list[ca.SX], tag: str = ""
+    ) -> tuple[list[ca.SX], FrozenTerms]:
+        """Return expressions of a phase with its `inputs` replaced by values, and its stand-ins."""
+        symbols, frozen = self.inputs(phase), phase.frozen
+        outer = ca.Function("expressions", [*symbols, frozen.symbol_vector], expressions)
+        if not any(ca.depends_on(k, frozen.symbol_vector) for k in expressions if k.numel()):
+            unused = ca.SX.zeros(frozen.symbol_vector.numel())
+            return outer.call([*values, unused], True, False), FrozenTerms()
+        inner = ca.Function("meanings", symbols, [frozen.meaning_vector])
+        renewed = ca.SX.sym(f"frozen{tag}", frozen.symbol_vector.numel())
+        (meanings,) = inner.call(values, True, False)
+        return outer.call([*values, renewed], True, False), FrozenTerms([renewed], [meanings])
 
 
 @dataclass(frozen=True)

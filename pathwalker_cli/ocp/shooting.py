@@ -7,23 +7,25 @@ Error-controlled Runge-Kutta steps lead from node to node (`shooting_steps`), as
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 
-from pathwalker_cli.nlp.blocks import Block, BlockProgram, Occurrences
+from pathwalker_cli.nlp.blocks import Occurrences
+from pathwalker_cli.ocp.layout import Bounded
 from pathwalker_cli.ocp.phased import PhasedMotion
-from pathwalker_cli.ocp.problem import INFINITY, ProblemNumbers, Rows
+from pathwalker_cli.ocp.problem import ProblemNumbers
 from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks
-from pathwalker_cli.ocp.shooting_layout import ShootingLayout
-from pathwalker_cli.ocp.shooting_motion import Edges, Shooter, ShootingNodes
-from pathwalker_cli.ocp.shooting_steps import CASH_KARP
+from pathwalker_cli.ocp.shooting_layout import ShootingPlaces, shooting_layout
+from pathwalker_cli.ocp.shooting_motion import Shooter, ShootingNodes
+from pathwalker_cli.ocp.shooting_steps import CASH_KARP, Edges
+from pathwalker_cli.ocp.transcription import Transcription
 
 __all__ = ["ShootingProgram"]
 
 
-class ShootingProgram:
+class ShootingProgram(Transcription[ShootingPlaces]):
     """A shooting problem with its numbers on one mesh and one choice of steps.
+
+    Steps of unequal number do not make groups of one size: IPOPT's own solver finds an order.
 
     Args:
         blocks: The blocks of the problem.
@@ -42,54 +44,41 @@ class ShootingProgram:
         rounding: float = 0.0,
     ) -> None:
         self.blocks = blocks
-        self.numbers = numbers
-        self.meshes = meshes
         self.edges = edges
         self.rounding = rounding
-        self.layout = ShootingLayout.make(blocks.shooting, edges)
-        occurrences = [self._boundary_rows()]
-        for i in range(len(meshes)):
-            occurrences += [self._residual_rows(i), self._step_rows(i), self._path_rows(i)]
-            occurrences.append(self._end_rows(i))
-        shared = blocks.problem.shared.numel()
-        self.program = BlockProgram(self.layout.size, occurrences, shared)
+        layout = shooting_layout(blocks.shooting, edges)
+        super().__init__(blocks.problem, numbers, meshes, layout)
 
-    elimination = None
-    """Steps of unequal number do not make groups of one size; IPOPT's own solver finds an order."""
+    def _occurrences(self) -> list[Occurrences]:
+        found = [self._boundary_rows(self.blocks.boundary)]
+        for i in range(len(self.meshes)):
+            found += [self._residual_rows(i), self._step_rows(i), self._path_rows(i)]
+            found.append(self._end_rows(i))
+        return found
 
-    @property
-    def parameters(self) -> np.ndarray:
-        """Parameter vector of the nonlinear program."""
-        return self.program.parameters(self.numbers.shared)
+    def _bounded(self) -> list[Bounded]:
+        """Return what is bounded at the nodes.
 
-    @cached_property
-    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Scaled lower and upper bounds of all unknowns."""
-        return self.layout.bounds(self.blocks.shooting, self.numbers.bounds)
-
-    def _row_bounds(
-        self, rows: Rows, count: int, phase: str = "", at_end: bool = False
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return scaled bounds of rows that hold at several instants, shape (r, count) each."""
-        low, high = self.numbers.bounds.of_rows(rows, phase, at_end)
-        return np.tile(low[:, None], count), np.tile(high[:, None], count)
-
-    def _occurrences(
-        self,
-        block: Block,
-        rows: Rows,
-        columns: np.ndarray,
-        bounds: tuple[np.ndarray, np.ndarray],
-        labels: list[str],
-    ) -> Occurrences:
-        """Return a block without data at these columns."""
-        data = np.zeros((0, columns.shape[1]))
-        lower, upper = bounds
-        return Occurrences(block, columns, data, lower, upper, rows.scale, rows.names, labels)
+        Algebraic variables are not at the start of a phase, where they continue those of the phase
+        before.
+        """
+        problem, shooting, layout = self.problem, self.blocks.shooting, self.layout
+        found = [
+            Bounded(layout.controls, shooting.controls.names),
+            Bounded(layout.smooth[0], problem.smooth.names),
+        ]
+        for phase, at in zip(problem.phases, layout.phases, strict=True):
+            ends = np.append(at.steps[at.starts[1:]], at.steps[-1])
+            z = shooting.algebraic(phase).names
+            found.append(Bounded(layout.states[ends], problem.states.names, phase.name))
+            found.append(Bounded(layout.smooth[ends], problem.smooth.names, phase.name))
+            found.append(Bounded(at.algebraic[at.starts[1:], 0], z, phase.name))
+            found.append(Bounded(at.last, z, phase.name, end=True))
+        return found
 
     def _residual_rows(self, i: int) -> Occurrences:
         """Return the equations for z at all stages and at the last instant of a phase."""
-        phase, layout, at = self.blocks.problem.phases[i], self.layout, self.layout.phases[i]
+        phase, layout, at = self.problem.phases[i], self.layout, self.layout.phases[i]
         stages = [np.moveaxis(k, -1, 0).reshape(k.shape[-1], -1) for k in
                   (at.states, at.smooth, at.algebraic)]  # fmt: skip
         last = self._last_columns(i)
@@ -100,10 +89,9 @@ class ShootingProgram:
             for n in at.interval
             for k in range(CASH_KARP.stages)
         ]
-        bounds = self._row_bounds(phase.residual, columns.shape[1], phase.name)
         labels.append(self._label(i, 1.0))
         block = self.blocks.phases[i].residual
-        return self._occurrences(block, phase.residual, columns, bounds, labels)
+        return self._rows_at(block, phase.residual, columns, labels, phase.name)
 
     def _last_columns(self, i: int) -> np.ndarray:
         """Return the unknowns p, x, y, z of the last instant of a phase, shape (n, 1)."""
@@ -112,43 +100,28 @@ class ShootingProgram:
         parts = [layout.parameters, layout.states[end], layout.smooth[end], at.last]
         return np.concatenate(parts)[:, None]
 
-    def _label(self, i: int, fraction: float) -> str:
-        return f"{self.blocks.problem.phases[i].name} at {100 * fraction:.0f} % of the phase"
-
     def _path_rows(self, i: int) -> Occurrences:
         """Return the path rows at all nodes but the first, where those of the phase before hold."""
-        phase, layout, at = self.blocks.problem.phases[i], self.layout, self.layout.phases[i]
+        phase, layout, at = self.problem.phases[i], self.layout, self.layout.phases[i]
         inner = at.starts[1:]
         parts = [at.states[inner, 0], at.smooth[inner, 0], at.algebraic[inner, 0]]
         parameters = np.tile(layout.parameters, (len(inner), 1))
         columns = np.concatenate([np.concatenate([parameters, *parts], axis=1).T,
                                   self._last_columns(i)], axis=1)  # fmt: skip
-        lower, upper = self._row_bounds(phase.path, columns.shape[1], phase.name)
-        fixed = [k for k, name in enumerate(phase.path.names) if name in phase.fixed_at_end]
-        lower[fixed, -1], upper[fixed, -1] = -INFINITY, INFINITY
         labels = [self._label(i, fraction) for fraction in self.meshes[i][1:]]
-        block = self.blocks.phases[i].path
-        return self._occurrences(block, phase.path, columns, (lower, upper), labels)
+        block, free = self.blocks.phases[i].path, phase.fixed_at_end
+        return self._rows_at(block, phase.path, columns, labels, phase.name, free)
 
     def _end_rows(self, i: int) -> Occurrences:
-        phase = self.blocks.problem.phases[i]
-        bounds = self._row_bounds(phase.end, 1, phase.name)
+        phase, block = self.problem.phases[i], self.blocks.phases[i].end
         columns, labels = self._last_columns(i), [self._label(i, 1.0)]
-        return self._occurrences(self.blocks.phases[i].end, phase.end, columns, bounds, labels)
+        return self._rows_at(block, phase.end, columns, labels, phase.name)
 
     def _step_rows(self, i: int) -> Occurrences:
         """Return the formulae of all steps of a phase."""
-        problem, layout, at = self.blocks.problem, self.layout, self.layout.phases[i]
-        mesh, stages = self.meshes[i], CASH_KARP.stages
-        columns, data, labels = [], [], []
+        problem, mesh, at = self.problem, self.meshes[i], self.layout.phases[i]
+        data, labels = [], []
         for m, n in enumerate(at.interval):
-            left, right = at.steps[m : m + 2]
-            parts = [[layout.durations[i]], layout.parameters]
-            for k in range(stages):
-                parts += [at.states[m, k], at.smooth[m, k], at.algebraic[m, k]]
-            parts += [layout.controls[at.nodes[n]], layout.controls[at.nodes[n + 1]]]
-            parts += [layout.integrals[left], layout.states[right], layout.smooth[right]]
-            columns.append(np.concatenate([*parts, layout.integrals[right]]))
             begin, end = self.edges[i][n][m - at.starts[n] :][:2]
             length = mesh[n + 1] - mesh[n]
             points = mesh[n] + length * (begin + (end - begin) * CASH_KARP.times)
@@ -156,14 +129,14 @@ class ShootingProgram:
             step = [length * (end - begin), begin, end - begin, self.rounding]
             data.append(np.concatenate([step, *given]))
             labels.append(f"{problem.phases[i].name} interval {n + 1} step {m - at.starts[n] + 1}")
-        where = [f"stage {k + 2}" for k in range(stages - 1)] + ["end"]
+        where = [f"stage {k + 2}" for k in range(CASH_KARP.stages - 1)] + ["end"]
         groups = (problem.states, problem.smooth)
         names = [f"{s} at {k}" for k in where for group in groups for s in group.names]
-        scale = np.tile(np.concatenate([group.scale for group in groups]), stages)
-        zeros = np.zeros((len(names) + len(problem.integrals), len(columns)))
+        scale = np.tile(np.concatenate([group.scale for group in groups]), CASH_KARP.stages)
+        zeros = np.zeros((len(names) + len(problem.integrals), len(data)))
         return Occurrences(
             self.blocks.phases[i].step,
-            np.array(columns).T,
+            self._step_columns(i),
             np.array(data).T,
             zeros,
             zeros,
@@ -172,26 +145,21 @@ class ShootingProgram:
             labels,
         )
 
-    def _boundary_rows(self) -> Occurrences:
-        rows, layout = self.blocks.problem.boundary.rows, self.layout
-        arrays = (layout.states, layout.smooth, layout.controls)
-        ends = [array[k] for k in (0, -1) for array in arrays]
-        columns = np.concatenate([layout.durations, layout.parameters, *ends, layout.integrals[-1]])
-        bounds, labels = self._row_bounds(rows, 1), ["the whole motion"]
-        return self._occurrences(self.blocks.boundary, rows, columns[:, None], bounds, labels)
-
-    def from_motion(self, motion: PhasedMotion) -> np.ndarray:
-        """Return scaled unknowns whose nodes are those of a motion on any mesh.
-
-        In between they follow from integration, so only the ends of intervals miss their node.
-        """
-        degree = motion.phases[0].degree
-        resampled = motion.resampled(self.meshes, degree)
-        return self.from_nodes(ShootingNodes.of(self.blocks.shooting, resampled))
+    def _step_columns(self, i: int) -> np.ndarray:
+        """Return the unknowns of every step of a phase, shape (n, M)."""
+        layout, at = self.layout, self.layout.phases[i]
+        once = np.append(layout.durations[i], layout.parameters)
+        parts = [np.tile(once, (len(at.interval), 1))]
+        for k in range(CASH_KARP.stages):
+            parts += [at.states[:, k], at.smooth[:, k], at.algebraic[:, k]]
+        parts += [layout.controls[at.nodes[at.interval + k]] for k in range(2)]
+        left, right = at.steps[:-1], at.steps[1:]
+        parts += [layout.integrals[left], layout.states[right], layout.smooth[right]]
+        return np.concatenate([*parts, layout.integrals[right]], axis=1).T
 
     def from_nodes(self, nodes: ShootingNodes) -> np.ndarray:
         """Return scaled unknowns for values at the nodes, integrated in between."""
-        problem, layout = self.blocks.problem, self.layout
+        problem, layout = self.problem, self.layout
         shooter = Shooter(self.blocks, self.numbers, nodes)
         values = np.zeros(layout.size)
         values[layout.durations] = nodes.durations

@@ -19,17 +19,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import partial
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.nlp.blocks import Block
-from pathwalker_cli.nlp.frozen import FrozenTerms
-from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Rows, Variables
+from pathwalker_cli.nlp.blocks import Block, Expressions
+from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Variables
 from pathwalker_cli.ocp.shooting_steps import CASH_KARP
-from pathwalker_cli.ocp.unknowns import Unknown, boundary_block
+from pathwalker_cli.ocp.transcription import Unknown, boundary_expressions
 
 __all__ = ["PhaseBlocks", "ShootingBlocks", "ShootingProblem"]
 
@@ -57,7 +56,7 @@ class ShootingProblem:
     def algebraic(self, phase: Phase) -> Variables:
         """Return the algebraic variables that the residuals of a phase determine.
 
-        They are the first ones; those behind (reserves of a gait) are zero.
+        They are the first ones; those behind are zero.
         """
         z, count = phase.algebraic, len(phase.residual.names)
         return Variables(z.symbol[:count], z.names[:count], z.scale[:count])
@@ -94,61 +93,36 @@ class ShootingBlocks:
     def __init__(self, shooting: ShootingProblem) -> None:
         self.shooting = shooting
         self.problem = shooting.problem
-        self.phases = tuple(
-            PhaseBlocks(
-                residual=self._point_block(phase, phase.residual, "residual"),
-                path=self._point_block(phase, phase.path, "path"),
-                end=self._point_block(phase, phase.end, "end"),
-                step=self._step_block(phase),
-                dynamics=self._dynamics(phase),
-            )
-            for phase in self.problem.phases
-        )
+        ends = partial(boundary_expressions, self.problem, shooting.controls)
+        self.boundary = Block("boundary", ends)
+        self.phases = tuple(map(self._phase_blocks, self.problem.phases))
 
-    def _inputs(self, phase: Phase) -> list[ca.SX]:
-        """Return the symbols x, z, y, u, p, shared, data of a phase."""
-        problem = self.problem
-        return [
-            problem.states.symbol,
-            phase.algebraic.symbol,
-            problem.smooth.symbol,
-            problem.controls.symbol,
-            problem.parameters.symbol,
-            problem.shared,
-            problem.point_data,
-        ]
+    def _phase_blocks(self, phase: Phase) -> PhaseBlocks:
+        points = {
+            kind: Block(f"{phase.name}_{kind}", partial(self._point, phase, kind))
+            for kind in ("residual", "path", "end")
+        }
+        step = Block(f"{phase.name}_step", partial(self._step, phase))
+        return PhaseBlocks(**points, step=step, dynamics=self._dynamics(phase))
 
     def _padded(self, phase: Phase, z: Any) -> Any:
         """Return all algebraic variables: zeros behind those that are solved for."""
         return ca.vertcat(z, type(z).zeros(phase.algebraic.size - z.numel()))
 
-    def _point_block(self, phase: Phase, rows: Rows, label: str) -> Block:
+    def _point(self, phase: Phase, kind: str) -> Expressions:
         """Return rows at one instant."""
-        problem, frozen = self.problem, phase.frozen
+        problem, rows = self.problem, getattr(phase, kind)
         p = Unknown.of(problem.parameters, "p")
         x, y = Unknown.of(problem.states, "x"), Unknown.of(problem.smooth, "y")
         z = Unknown.of(self.shooting.algebraic(phase), "z")
         nothing = [ca.SX.zeros(problem.controls.size), p.value, problem.shared]
         nothing.append(ca.SX.zeros(problem.point_data.numel()))
         values = [x.value, self._padded(phase, z.value), y.value, *nothing]
-        symbols, scaled = self._inputs(phase), rows.value / rows.scale
-        stand_ins = frozen.symbol_vector
-        needed = bool(scaled.numel()) and ca.depends_on(scaled, stand_ins)
-        outer = ca.Function("rows", [*symbols, stand_ins], [scaled])
-        inner = ca.Function("meanings", symbols, [frozen.meaning_vector])
-        (result,) = outer.call([*values, stand_ins], True, False)
-        return Block(
-            f"{phase.name}_{label}",
-            ca.vertcat(p.scaled, x.scaled, y.scaled, z.scaled),
-            ca.SX(0, 1),
-            problem.shared,
-            result,
-            frozen=FrozenTerms([stand_ins], inner.call(values, True, False))
-            if needed
-            else FrozenTerms(),
-        )
+        (result,), frozen = problem.substituted(phase, [rows.value / rows.scale], values)
+        unknowns = ca.vertcat(p.scaled, x.scaled, y.scaled, z.scaled)
+        return Expressions(unknowns, ca.SX(0, 1), problem.shared, result, frozen=frozen)
 
-    def _step_block(self, phase: Phase) -> Block:
+    def _step(self, phase: Phase) -> Expressions:
         """Return the formulae of stages 2 to s and of the end of one step.
 
         Data: share of the phase that the step takes, where it begins and how long it is as shares
@@ -168,7 +142,9 @@ class ShootingBlocks:
         x_end, y_end = Unknown.of(problem.states, "x_end"), Unknown.of(problem.smooth, "y_end")
         before, after = (ca.SX.sym(f"s{k}", len(problem.integrals)) for k in range(2))
         data = [ca.SX.sym(f"data{k}", problem.point_data.numel()) for k in range(pair.stages)]
-        slope = ca.Function("slope", self._inputs(phase), [phase.derivative, phase.integrands])
+        slope = ca.Function(
+            "slope", self.problem.inputs(phase), [phase.derivative, phase.integrands]
+        )
         slopes: list[tuple[ca.SX, ca.SX, ca.SX]] = []
         for k in range(pair.stages):
             e = left.value + (begin + width * pair.times[k]) * (right.value - left.value)
@@ -190,8 +166,7 @@ class ShootingBlocks:
         rows.append(after - before - step * cost / problem.integral_scale)
         stages = [k.scaled for stage in zip(x, y, z, strict=True) for k in stage]
         ends = [left.scaled, right.scaled, before, x_end.scaled, y_end.scaled, after]
-        return Block(
-            f"{phase.name}_step",
+        return Expressions(
             ca.vertcat(duration, p.scaled, *stages, *ends),
             ca.vertcat(share, begin, width, rounding, *data),
             problem.shared,
@@ -201,7 +176,7 @@ class ShootingBlocks:
     def _linear_system(self, phase: Phase) -> ca.Function:
         """Return the function (x, y, p, shared) -> matrix, constant of r = matrix z + constant."""
         frozen, residual = phase.frozen, phase.residual.value
-        symbols = self._inputs(phase)
+        symbols = self.problem.inputs(phase)
         x, z, y, u, p, shared, data = symbols
         matrix = ca.jacobian(residual, self.shooting.algebraic(phase).symbol)
         outer = ca.Function("outer", [*symbols, frozen.symbol_vector], [matrix, residual])
@@ -213,7 +188,7 @@ class ShootingBlocks:
 
     def _dynamics(self, phase: Phase) -> ca.Function:
         """Return the explicit differential equation with the linear system for z solved."""
-        symbols, e = self._inputs(phase), self.shooting.controls.symbol
+        symbols, e = self.problem.inputs(phase), self.shooting.controls.symbol
         y_symbol = self.problem.smooth.symbol
         rate = ca.Function("rate", [e, y_symbol], [self.shooting.rate(e, y_symbol, 0.0)])
         slope = ca.Function("slope", symbols, [phase.derivative, phase.integrands])
@@ -227,8 +202,3 @@ class ShootingBlocks:
         x_rate, cost = slope(x, self._padded(phase, z), y, y_rate, p, shared, data)
         outputs = [z, ca.vertcat(x_rate, y_rate, cost)]
         return ca.Function(f"{phase.name}_dynamics", inputs, outputs)
-
-    @cached_property
-    def boundary(self) -> Block:
-        """Boundary rows and objective with e in the place of the controls, see `boundary_block`."""
-        return boundary_block(self.problem, self.shooting.controls)

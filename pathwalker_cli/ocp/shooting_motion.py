@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,17 +10,9 @@ import numpy as np
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times
 from pathwalker_cli.ocp.problem import ProblemNumbers
 from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks, ShootingProblem
-from pathwalker_cli.ocp.shooting_steps import (
-    Slope,
-    Step,
-    adaptive_steps,
-    fixed_steps,
-)
+from pathwalker_cli.ocp.shooting_steps import Edges, Slope, Step, adaptive_steps, fixed_steps
 
-__all__ = ["Edges", "Shooter", "ShootingNodes"]
-
-Edges = tuple[tuple[np.ndarray, ...], ...]
-"""Ends of the steps of every interval, from 0 to 1, by phase and interval."""
+__all__ = ["Shooter", "ShootingNodes"]
 
 
 @dataclass(frozen=True)
@@ -120,21 +113,18 @@ class Shooter:
 
     def defect(self, edges: Edges) -> float:
         """Return the largest gap between the end of an interval and its node, in scale units."""
-        worst = 0.0
-        for i, intervals in enumerate(edges):
-            for n, ends in enumerate(intervals):
-                end, node = self.steps(i, n, ends)[-1].end, self.start(i, n + 1)
-                worst = max(worst, float(np.abs((end - node) / self._scale).max()))
-        return worst
+        gaps = (steps[-1].end - self.start(i, n + 1) for i, n, steps in self._intervals(edges))
+        return float(max(np.abs(gap / self._scale).max() for gap in gaps))
 
     def error(self, edges: Edges) -> float:
         """Return the largest error estimate of all steps, in units of the scales."""
-        return max(
-            step.error
-            for i, intervals in enumerate(edges)
-            for n, ends in enumerate(intervals)
-            for step in self.steps(i, n, ends)
-        )
+        return max(step.error for _, _, steps in self._intervals(edges) for step in steps)
+
+    def _intervals(self, edges: Edges) -> Iterator[tuple[int, int, tuple[Step, ...]]]:
+        """Yield phase, interval and steps of all intervals."""
+        for i, intervals in enumerate(edges):
+            for n, ends in enumerate(intervals):
+                yield i, n, self.steps(i, n, ends)
 
     def motion(self, edges: Edges, degree: int = 3) -> PhasedMotion:
         """Return the motion on a mesh of all steps, in the form of a collocated one.

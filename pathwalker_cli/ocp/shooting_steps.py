@@ -24,10 +24,13 @@ import numpy as np
 
 from pathwalker_cli.errors import NotConvergedError
 
-__all__ = ["CASH_KARP", "EmbeddedPair", "Slope", "Step", "adaptive_steps", "fixed_steps"]
+__all__ = ["CASH_KARP", "Edges", "EmbeddedPair", "Slope", "Step", "adaptive_steps", "fixed_steps"]
 
 Slope = Callable[[float, np.ndarray], np.ndarray]
 """Returns dX/dt, shape (n,), at a time and a state X, shape (n,)."""
+
+Edges = tuple[tuple[np.ndarray, ...], ...]
+"""Ends of the steps of every interval, from 0 to 1, by phase and interval."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +74,21 @@ def _cash_karp() -> EmbeddedPair:
 
 CASH_KARP: Final = _cash_karp()
 
-_MOST_STEPS = 200
+_MOST_STEPS: Final = 200
 """In one interval; a shooting interval of a few hundredths of a second needs some five."""
+
+_FINEST: Final = 1e5
+"""Steps of which so many would fit into an interval are given up."""
 
 _SAFETY, _LEAST, _MOST = 0.9, 0.2, 4.0
 """Step sizes aim at this share of the tolerance's step and change by these factors at most."""
+
+_SMALLEST_RATIO: Final = 1e-10
+"""Of error and tolerance, where a step makes no error at all."""
+
+_ROUNDING, _WHOLE = 1e-12, 1e-9
+"""What is left of an interval, as a share of it, that counts as nothing; and how far a number of
+steps may exceed a whole one."""
 
 
 @dataclass(frozen=True)
@@ -143,17 +156,17 @@ def adaptive_steps(
     at, end = span
     steps: list[Step] = []
     width = end - at
-    while end - at > 1e-12 * (end - span[0]):
+    while end - at > _ROUNDING * (end - span[0]):
         left = end - at
-        step = _step(slope, start, at, left / np.ceil(left / width - 1e-9), scale)
-        ratio = max(step.error / tolerance, 1e-10) if np.isfinite(step.error) else np.inf
+        step = _step(slope, start, at, left / np.ceil(left / width - _WHOLE), scale)
+        ratio = max(step.error / tolerance, _SMALLEST_RATIO) if np.isfinite(step.error) else np.inf
         width = step.width * float(
             np.clip(_SAFETY * ratio ** (-1 / CASH_KARP.order), _LEAST, _MOST)
         )
         if ratio <= 1.0:
             steps.append(step)
             start, at = step.end, at + step.width
-        if len(steps) > _MOST_STEPS or width < (end - span[0]) / 1e5:
+        if len(steps) > _MOST_STEPS or width < (end - span[0]) / _FINEST:
             raise NotConvergedError(
                 f"no step is short enough for an integration error of {tolerance:g}; "
                 "the motion is too far from one that the model can make"

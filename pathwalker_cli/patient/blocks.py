@@ -5,11 +5,13 @@ SI units and radians; angles carry the signs of `conventions` (+ankle = plantarf
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Final
 
 from pydantic import Field, field_validator, model_validator
 
-from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX
+from pathwalker_cli.conventions import ANGLES, GENERATORS, SIDES, SUFFIX
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
 
 __all__ = [
@@ -18,6 +20,7 @@ __all__ = [
     "FootPoints",
     "LengthRange",
     "OrthosisData",
+    "OrthosisFault",
     "RealSpring",
     "Recorded",
     "SegmentLengths",
@@ -26,6 +29,7 @@ __all__ = [
     "SpringSet",
     "Springs",
     "Strengths",
+    "orthosis_fault",
 ]
 
 Length = Annotated[float, Quantity("m", 0.005, 1.0, above="is it in centimetres or millimetres?")]
@@ -212,49 +216,90 @@ class OrthosisData(YamlModel):
         return self
 
     @model_validator(mode="after")
-    def _stops(self) -> OrthosisData:
-        clearance = _STOP_CLEARANCE * self.free_play
-        for side in SIDES:
-            low, high = self.dorsiflexion_stop[side], self.plantarflexion_stop[side]
-            if not low < self.neutral_angle - clearance < self.neutral_angle + clearance < high:
-                raise invalid(
-                    f"has neutral_angle {self.neutral_angle:g} rad with free_play "
-                    f"{self.free_play:g} rad, not between the {side} stops",
-                    allowed=f"between {low:g} and {high:g} rad, {_STOP_CLEARANCE:g} times the "
-                    "free play from either",
-                )
-        return self
-
-    @model_validator(mode="after")
     def _exact(self) -> OrthosisData:
-        for kind in ("dorsiflexion", "plantarflexion"):
-            fault = self.spring_fault(kind, *getattr(self.stiffness_range, kind))
+        for side in SIDES:
+            fault = orthosis_fault(self.ranges(side), side)
             if fault is not None:
-                what, allowed = fault
-                raise invalid(f"has stiffness_range.{kind} {what}", allowed=allowed)
+                prefix = f"stiffness_range.{fault.spring} " if fault.spring else ""
+                raise invalid(f"has {prefix}{fault.what}", allowed=fault.allowed)
         return self
 
-    def spring_fault(self, kind: str, low: float, high: float) -> tuple[str, str] | None:
-        """Return why the torque curve would not be exact with springs of a range, if so.
+    def ranges(self, side: str) -> dict[str, tuple[float, float]]:
+        """Return every number of the torque curve of a side, springs with their whole range."""
+        single = {
+            "neutral_angle": self.neutral_angle,
+            "free_play": self.free_play,
+            "preload_torque": self.preload_torque,
+            "dorsiflexion_stop": self.dorsiflexion_stop[side],
+            "plantarflexion_stop": self.plantarflexion_stop[side],
+            "dorsiflexion_stop_stiffness": self.stop_stiffness.dorsiflexion,
+            "plantarflexion_stop_stiffness": self.stop_stiffness.plantarflexion,
+        }
+        return {
+            "dorsiflexion_stiffness": self.stiffness_range.dorsiflexion,
+            "plantarflexion_stiffness": self.stiffness_range.plantarflexion,
+            **{name: (value, value) for name, value in single.items()},
+        }
 
-        Args:
-            kind: "dorsiflexion" or "plantarflexion".
-            low: Softest spring [N m/rad].
-            high: Stiffest spring [N m/rad].
 
-        Returns:
-            What is wrong, without the name of the range, and what is allowed; None if it is fine.
-        """
-        stop = getattr(self.stop_stiffness, kind)
-        for side in SIDES:
-            reach = abs(getattr(self, f"{kind}_stop")[side] - self.neutral_angle)
-            preloaded = self.preload_torque / (reach - self.free_play / 2.0)
-            if not stop / _STEEPEST <= low + preloaded <= high + preloaded <= stop * _STEEPEST:
-                return (
-                    f"[{low:g}, {high:g}] N m/rad, too far from stop_stiffness.{kind} {stop:g}",
-                    f"springs within a factor of {_STEEPEST:g} of the stop",
-                )
-        return None
+@dataclass(frozen=True)
+class OrthosisFault:
+    """Why the torque curve of an orthosis would not be exact.
+
+    Args:
+        numbers: Names of the numbers at fault, the first of them the one to change.
+        what: What is wrong, without the name of a range of springs.
+        allowed: What is allowed.
+        spring: "dorsiflexion" or "plantarflexion" where it is about springs.
+    """
+
+    numbers: tuple[str, ...]
+    what: str
+    allowed: str
+    spring: str = ""
+
+
+def orthosis_fault(ranges: Mapping[str, tuple[float, float]], side: str) -> OrthosisFault | None:
+    """Return why the torque curve is not exact everywhere within ranges of its numbers, if so.
+
+    Args:
+        ranges: Least and largest value by name, as `OrthosisData.ranges` has them [SI].
+        side: The side, for the message.
+    """
+    low = {name: pair[0] for name, pair in ranges.items()}
+    high = {name: pair[1] for name, pair in ranges.items()}
+    stops = high["dorsiflexion_stop"], low["plantarflexion_stop"]
+    middle, clearance = ("neutral_angle", _STOP_CLEARANCE * high["free_play"])
+    if not stops[0] < low[middle] - clearance < high[middle] + clearance < stops[1]:
+        return OrthosisFault(
+            (middle, "dorsiflexion_stop", "plantarflexion_stop", "free_play"),
+            f"neutral_angle {_range(ranges[middle])} rad with free_play "
+            f"{_range(ranges['free_play'])} rad, not between the {side} stops",
+            f"between {stops[0]:g} and {stops[1]:g} rad, {_STOP_CLEARANCE:g} times the "
+            "free play from either",
+        )
+    for kind, reach in (
+        ("dorsiflexion", (low[middle] - stops[0], high[middle] - low["dorsiflexion_stop"])),
+        ("plantarflexion", (stops[1] - high[middle], high["plantarflexion_stop"] - low[middle])),
+    ):
+        spring, stop = f"{kind}_stiffness", f"{kind}_stop_stiffness"
+        softest = low[spring] + low["preload_torque"] / (reach[1] - low["free_play"] / 2.0)
+        stiffest = high[spring] + high["preload_torque"] / (reach[0] - high["free_play"] / 2.0)
+        if high[stop] / _STEEPEST <= softest and stiffest <= low[stop] * _STEEPEST:
+            continue
+        return OrthosisFault(
+            (spring, stop, "preload_torque", middle),
+            f"[{low[spring]:g}, {high[spring]:g}] N m/rad, too far from stop_stiffness.{kind} "
+            f"{_range(ranges[stop])}",
+            f"springs within a factor of {_STEEPEST:g} of the stop",
+            kind,
+        )
+    return None
+
+
+def _range(pair: tuple[float, float]) -> str:
+    """Return a number as text, or the range in which it lies."""
+    return f"{pair[0]:g}" if pair[0] == pair[1] else f"[{pair[0]:g}, {pair[1]:g}]"
 
 
 Speed = Annotated[float, Quantity("m/s", 0.0, 5.0, above="is it in km/h or cm/s?")]
@@ -298,8 +343,8 @@ class Recorded(YamlModel):
     @classmethod
     def _known(cls, value: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
         for name, (low, high) in value.items():
-            if name not in COORDINATES[2:]:
-                raise invalid(f"names '{name}'", allowed=", ".join(COORDINATES[2:]))
+            if name not in ANGLES:
+                raise invalid(f"names '{name}'", allowed=", ".join(ANGLES))
             if low > high:
                 raise invalid(f"has {name} upside down", allowed="[lowest, highest] in rad")
         return value

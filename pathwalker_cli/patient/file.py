@@ -9,7 +9,7 @@ import os
 import re
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
@@ -146,6 +146,23 @@ class Patient(YamlModel):
         if self.orthosis is None:
             raise self._lacks("orthosis", "add it, or choose the barefoot condition")
         return self.orthosis
+
+    def number(self, address: str) -> float:
+        """Return the number at a place in the file, e.g. "orthosis.neutral_angle.right".
+
+        Raises:
+            PatientError: If the file gives none there.
+        """
+        holder: Any = self
+        for part in address.split("."):
+            if isinstance(holder, int | float):  # one number for both sides
+                break
+            holder = holder[part] if isinstance(holder, Sides) else getattr(holder, part)
+            if holder is None and part == "strengths":
+                raise self._lacks("strengths", "add them, or estimate them from recordings")
+            if holder is None:
+                raise self._lacks(part, f"add it for what needs {address}")
+        return float(holder)
 
     def length(self, name: str, side: str | None = None) -> float:
         """Return a segment length or joint offset [m], measured or from proportions.

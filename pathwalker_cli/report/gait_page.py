@@ -88,7 +88,7 @@ def _springs(run: ReportRun) -> str:
     """Return the springs with how sure they are, sides that agree together."""
     stiffness, verdict = recommended(run), run.verdict
     sure = {name: "prescribed" for name in STIFFNESSES if prescribed(run, name)}
-    sure |= {s.spring: s.determined for s in verdict.springs} if verdict else {}
+    sure |= {s.name: s.determined for s in verdict.springs} if verdict else {}
     parts: dict[str, list[str]] = {}
     for name, value in stiffness.items():
         kind, _, side = measure_of(name).label.rpartition(" ")

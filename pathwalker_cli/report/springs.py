@@ -8,7 +8,7 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.report.content import Fact, Row, Section, Table
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.stride.measures import measure_of
-from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, Verdict
+from pathwalker_cli.studies.verdict import SHARE, NumberVerdict, Verdict
 from pathwalker_cli.studies.verdict_text import (
     PRESCRIBED,
     per_degree,
@@ -60,7 +60,7 @@ def recommended(run: ReportRun) -> dict[str, float]:
     return {name: chosen.get(name, _identified(run, name)) for name in STIFFNESSES}
 
 
-def verdict_words(spring: SpringVerdict) -> str:
+def verdict_words(spring: NumberVerdict) -> str:
     """Return in words how sure a spring is."""
     if spring.prescribed:
         return PRESCRIBED
@@ -80,7 +80,7 @@ def _identified(run: ReportRun, name: str) -> float:
 def _row(run: ReportRun, name: str) -> Row:
     """Return the row of one spring."""
     take, found, verdict = recommended(run)[name], _identified(run, name), run.verdict
-    spring = next((s for s in verdict.springs if s.spring == name), None) if verdict else None
+    spring = next((s for s in verdict.springs if s.name == name), None) if verdict else None
     snapped = verdict.snapped.names.get(name, "") if verdict and verdict.snapped else ""
     region = ("-", "-")
     words = PRESCRIBED if prescribed(run, name) else "not judged"
@@ -120,7 +120,7 @@ def _facts(verdict: Verdict) -> list[Fact]:
         others = "not searched for (starts: 8 does)"
     facts = [Fact("Real springs", real), Fact("Other optima", others)]
     doubts = [
-        f"{measure_of(s.spring).label}: {'; '.join(found)}"
+        f"{measure_of(s.name).label}: {'; '.join(found)}"
         for s in verdict.springs
         if (found := list(reservations(s)))
     ]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side, to_degrees
-from pathwalker_cli.model.muscle import generators
+from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION
 from pathwalker_cli.stride.figures.style import (
     NEUTRAL,

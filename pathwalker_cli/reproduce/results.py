@@ -13,12 +13,12 @@ from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait
 from pathwalker_cli.evaluation.paper import PATIENT
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
 from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce.inverse_study import InverseResult
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import stride_of
-from pathwalker_cli.stride.verify import ActiveBound
 
 __all__ = ["ProblemResult", "Results", "evaluated", "recordings"]
 

@@ -18,11 +18,11 @@ from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.json_file import json_text
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.nlp.kernels import kernels_level
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.stride.balance import balance
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.stride import stride_of
-from pathwalker_cli.stride.verify import ActiveBound
 from pathwalker_cli.versions import today, versions
 
 __all__ = [
@@ -81,6 +81,7 @@ class RunMetrics(BaseModel):
     active_bounds: list[str] | None = None
     active: list[ActiveBound] | None = None
     stiffness_ranges: dict[str, tuple[float, float]] = {}
+    unknowns: list[dict[str, Any]] = []
     bound_sources: dict[str, str] | None = None
     notes: list[str] | None = None
     intervals: int | None = None
@@ -165,6 +166,22 @@ def stiffness_ranges(solution: GaitSolution) -> dict[str, tuple[float, float]]:
     return {name: pair for name, pair in ranges.items() if pair is not None}
 
 
+def unknowns(solution: GaitSolution) -> list[dict[str, Any]]:
+    """Return every number that was free to choose: name, place, value, unit and range."""
+    return [
+        {
+            "name": unknown.name,
+            "place": unknown.address,
+            "value": value,
+            "unit": unknown.unit,
+            "range": solution.bounds.ranges[unknown.name],
+        }
+        for unknown, value in zip(
+            solution.walker.unknowns, solution.last_motion.parameters.tolist(), strict=True
+        )
+    ]
+
+
 def metrics_hash(metrics: Mapping[str, Any]) -> str:
     """Return the SHA-256 of all metrics but the one that holds it."""
     return sha256(json_text({k: v for k, v in metrics.items() if k != METRICS_HASH}).encode())
@@ -225,6 +242,7 @@ def _proof(solution: GaitSolution) -> dict[str, Any]:
         "active_bounds": [str(bound) for bound in solution.active],
         "active": [asdict(bound) for bound in solution.active],
         "stiffness_ranges": stiffness_ranges(solution),
+        "unknowns": unknowns(solution),
         "bound_sources": solution.bounds.sources,
         "notes": solution.walker.patient.notes,
     }

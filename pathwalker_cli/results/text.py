@@ -13,15 +13,16 @@ from rich.text import Text
 from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES, SUFFIX, to_degrees
 from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import OrthosisData
 from pathwalker_cli.stride.measures import TABLES, expanded, measure_of, measures_in
-from pathwalker_cli.stride.verify import ActiveBound
 
 __all__ = [
     "angle_words",
     "bound_line",
     "bound_lines",
     "detail_lines",
+    "end_of",
     "failure_text",
     "interesting",
     "notes_together",
@@ -42,7 +43,18 @@ stay a little away from every bound, by far less than this."""
 
 _WISH: Final = {"upper": "stiffer", "lower": "softer"}
 
-End = Literal["lower", "upper"]
+End = Literal["", "lower", "upper"]
+
+
+def end_of(value: float, limits: tuple[float, float]) -> End:
+    """Return the end of its range at which a number sits; "" inside, or where it has no choice."""
+    low, high = limits
+    margin = _AT_LIMIT * (high - low)
+    if low == high:
+        return ""
+    if value >= high - margin:
+        return "upper"
+    return "lower" if value <= low + margin else ""
 
 
 def spring_ends(
@@ -54,16 +66,10 @@ def spring_ends(
         values: Stiffness by spring [N m/rad]; other keys do no harm.
         ranges: Lowest and highest allowed value by spring [N m/rad].
     """
-    ends: dict[str, End] = {}
-    for name, (low, high) in ranges.items():
-        value, margin = values.get(name), _AT_LIMIT * (high - low)
-        if value is None or low == high:  # prescribed, not found
-            continue
-        if value >= high - margin:
-            ends[name] = "upper"
-        elif value <= low + margin:
-            ends[name] = "lower"
-    return ends
+    known = {
+        name: end_of(values[name], ranges[name]) for name in ranges if values.get(name) is not None
+    }
+    return {name: end for name, end in known.items() if end}
 
 
 def spring_notes(values: Mapping[str, Any], ranges: Mapping[str, tuple[float, float]]) -> list[str]:

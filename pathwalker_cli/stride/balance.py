@@ -13,7 +13,6 @@ import numpy as np
 import pinocchio as pin
 
 from pathwalker_cli.conventions import CONTACT_POINTS
-from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS
 from pathwalker_cli.stride.series import GaitSeries
 
 __all__ = ["Balance", "balance"]
@@ -147,8 +146,8 @@ class _Powers:
 
 
 def _powers(series: GaitSeries, states: list[_State]) -> _Powers:
-    each = series.muscle_torque * series.v[:, list(GENERATOR_ROWS)]
-    worn = series.orthosis_torque * series.v[:, list(ANKLES)]
+    powers, muscles = series.element_power, len(series.walker.muscles)
+    each, worn = powers[:, :muscles], powers[:, muscles:]
     return _Powers(
         muscle=each.sum(axis=1),
         orthosis=worn.sum(axis=1),

@@ -14,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, ROOT, SIDES, SUFFIX, Side
-from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS
 from pathwalker_cli.stride.measure import (
     ANKLE,
     EFFORT,
@@ -104,10 +103,11 @@ def _peak_moments(stride: Stride, scale: float = 1.0) -> dict[str, float]:
     }
 
 
-def _work(stride: Stride, of: str, sign: float) -> float:
-    """Return what actuators did (+) or took up (-), each for itself, over the stride [J]."""
-    rows = {"muscle_torque": GENERATOR_ROWS, "orthosis_torque": ANKLES}[of]
-    power = stride.known(of) * stride.known("v")[:, list(rows)]
+def _work(stride: Stride, muscles: bool, sign: float) -> float:
+    """Return what muscles or the others did (+) or took up (-), each for itself [J]."""
+    count = len(stride.walker.muscles)
+    elements = slice(count) if muscles else slice(count, None)
+    power = stride.known("element_power")[:, elements]
     return sign * float(stride.weights @ np.maximum(sign * power, 0.0).sum(axis=1))
 
 
@@ -207,7 +207,8 @@ REGISTRY: tuple[Measure, ...] = (
             kept=False),
     *per_side("min_stance_knee_flexion_*", "least stance knee flexion, *", "rad",
               "least knee flexion of stance: the crouch measure",
-              lambda s, side: _crouch(s, side)[0], "knee, *", "knee *", section=KNEE, part="stance"),
+              lambda s, side: _crouch(s, side)[0], "knee, *", "knee *", section=KNEE,
+              part="stance"),
     *per_side("min_stance_knee_flexion_time_*", "time of least stance knee flexion, *", "s",
               "when that is", lambda s, side: _crouch(s, side)[1], section=KNEE, shown=False),
     Measure("joint_range", "joint ranges", "rad",
@@ -239,16 +240,16 @@ REGISTRY: tuple[Measure, ...] = (
             lambda s: s.phase_durations, shown=False),
     Measure("positive_muscle_work", "muscles, positive", "J",
             "work that generators did, each for itself",
-            lambda s: _work(s, "muscle_torque", 1.0), section=WORK),
+            lambda s: _work(s, True, 1.0), section=WORK),
     Measure("negative_muscle_work", "muscles, negative", "J",
             "work that generators took up, each for itself, negative",
-            lambda s: _work(s, "muscle_torque", -1.0), section=WORK),
+            lambda s: _work(s, True, -1.0), section=WORK),
     Measure("positive_orthosis_work", "orthoses, positive", "J",
-            "work that the orthoses gave back", lambda s: _work(s, "orthosis_torque", 1.0),
+            "work that the orthoses gave back", lambda s: _work(s, False, 1.0),
             section=WORK),
     Measure("negative_orthosis_work", "orthoses, negative", "J",
             "work that the orthoses took up, negative",
-            lambda s: _work(s, "orthosis_torque", -1.0), section=WORK),
+            lambda s: _work(s, False, -1.0), section=WORK),
     Measure("effort", "effort", "s", "integral of the sum of squared activations", _effort,
             section=EFFORT, shown=False),
     Measure("effort_per_distance", "effort per distance", "s/m", "effort over distance",

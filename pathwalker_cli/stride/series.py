@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from functools import cache, cached_property
+from dataclasses import dataclass
+from functools import cached_property
 
-import casadi as ca
 import numpy as np
 
-from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES
-from pathwalker_cli.model.contact import phase_named
-from pathwalker_cli.model.muscle import excitation_from_rate, generators
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
-from pathwalker_cli.model.walker import ANKLES, GENERATOR_ROWS, Walker
+from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.model.contact import FORCES, phase_named
+from pathwalker_cli.model.elements.muscle import excitation_from_rate
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 
-__all__ = ["GaitSeries", "actuator_torques", "gait_series"]
+__all__ = ["GaitSeries", "gait_series"]
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class GaitSeries:
     """One stride, n instants; SI units and radians, orders as in `conventions`.
 
     Args:
-        walker: Who walks.
+        walker: Who walks, with the numbers that the motion was found with.
         motion: The motion that was sampled.
         time: Instants [s], shape (n,); the first is 0.
         phase: Name of the phase at each instant, n of them.
@@ -34,9 +32,7 @@ class GaitSeries:
         activation_rate: Their rates [1/s], shape (n, 14).
         force: Ground reaction forces on the body [N], shape (n, 8); zero without contact.
         reserve: Reserve forces [N, N m], shape (n, 10); zero in every accepted solution.
-        muscle_torque: Torque of each generator [N m], shape (n, 14).
-        orthosis_torque: Torques of the orthoses right, left [N m], shape (n, 2).
-        stiffness: K_D right, left, K_P right, left [N m/rad], shape (4,); empty when barefoot.
+        element_force: Forces of all elements [N m] in the order of `walker.elements`, (n, k).
     """
 
     walker: Walker
@@ -50,24 +46,43 @@ class GaitSeries:
     activation_rate: np.ndarray
     force: np.ndarray
     reserve: np.ndarray
-    muscle_torque: np.ndarray
-    orthosis_torque: np.ndarray
-    stiffness: np.ndarray
+    element_force: np.ndarray
 
     @cached_property
     def excitation(self) -> np.ndarray:
         """Neural excitations in [0, 1], shape (n, 14), from equation (2)."""
         return excitation_from_rate(self.activation_rate, self.activation)
 
+    @property
+    def muscle_torque(self) -> np.ndarray:
+        """Torque of each muscle torque generator [N m], shape (n, 14)."""
+        return self.element_force[:, : len(self.walker.muscles)]
+
+    @property
+    def orthosis_torque(self) -> np.ndarray:
+        """Torques of the orthoses right, left [N m], shape (n, 2); zero when barefoot."""
+        if not self.walker.device.worn:
+            return np.zeros((len(self.time), len(SIDES)))
+        names = [element.name for element in self.walker.elements]
+        orthoses = [self.walker.device.elements[side].name for side in SIDES]
+        return self.element_force[:, [names.index(name) for name in orthoses]]
+
+    @property
+    def stiffness(self) -> np.ndarray:
+        """K_D right, left, K_P right, left [N m/rad], shape (4,); empty when barefoot."""
+        return self.walker.stiffness
+
+    @cached_property
+    def element_power(self) -> np.ndarray:
+        """Power of every force of `element_force` [W], shape (n, k)."""
+        walker = self.walker
+        rows = [walker.skeleton.index(name) for e in walker.elements for name in e.coordinates]
+        return self.element_force * self.v[:, rows]
+
     @cached_property
     def net_torque(self) -> np.ndarray:
-        """Sum of muscle and orthosis torques per coordinate [N m], shape (n, 10)."""
-        tau = np.zeros_like(self.q)
-        for i, row in enumerate(GENERATOR_ROWS):
-            tau[:, row] += self.muscle_torque[:, i]
-        for i, row in enumerate(ANKLES):
-            tau[:, row] += self.orthosis_torque[:, i]
-        return tau
+        """Sum of the forces of all elements per coordinate [N m], shape (n, 10)."""
+        return self.walker.generalised_forces(self.element_force)
 
     @cached_property
     def contact_position(self) -> np.ndarray:
@@ -98,7 +113,7 @@ class GaitSeries:
 
     def column(self, coordinate: str) -> np.ndarray:
         """Return one generalised coordinate over time, shape (n,)."""
-        return np.asarray(self.q[:, COORDINATES.index(coordinate)])
+        return np.asarray(self.q[:, self.walker.skeleton.index(coordinate)])
 
     def vertical_force(self, side: str) -> np.ndarray:
         """Return the vertical ground reaction force on a foot ("right", "left") [N], shape (n,)."""
@@ -109,89 +124,43 @@ class GaitSeries:
         return self._foot_force(side, "x")
 
     def _foot_force(self, side: str, axis: str) -> np.ndarray:
-        rows = [CONTACT_FORCES.index(f"{p}_{side[0]}_{axis}") for p in ("heel", "toe")]
+        rows = [i for i, f in enumerate(FORCES) if f.point.side == side and f.axis == axis]
         return np.asarray(self.force[:, rows].sum(axis=1))
-
-
-def actuator_torques(walker: Walker) -> ca.Function:
-    """Return the function (q, v, activation, stiffness) -> muscle (14,), orthosis (2,) torques.
-
-    The stiffness is (K_D right, left, K_P right, left) [N m/rad], empty for a barefoot walker.
-    """
-    sides = walker.orthosis or ()
-    general = _torques(len(sides))
-    inputs = [ca.SX.sym(name, general.size1_in(i)) for i, name in enumerate("qvak")]
-    numbers = np.array([value for side in sides for value in vars(side).values()])
-    outputs = general.call([*inputs, walker.max_isometric_torque, numbers], True, False)
-    return ca.Function("torques", inputs, outputs)
-
-
-@cache
-def _torques(sides: int) -> ca.Function:
-    """Return the torques of any walker: strengths and orthosis parameters are inputs too."""
-    q, v, a = (ca.SX.sym(name, size) for name, size in (("q", 10), ("v", 10), ("a", 14)))
-    k, strength = ca.SX.sym("k", 2 * sides), ca.SX.sym("strength", len(GENERATOR_ROWS))
-    numbers = ca.SX.sym("orthosis", sides * len(fields(OrthosisSide)))
-    muscle = [
-        g.torque(q[row], v[row], a[i], strength[i])
-        for i, (g, row) in enumerate(zip(generators(), GENERATOR_ROWS, strict=True))
-    ]
-    worn = [OrthosisSide(*ca.vertsplit(part)) for part in _halves(numbers, sides)]
-    orthosis = [
-        orthosis_torque(side, q[row], k[i], k[i + 2])
-        for i, (side, row) in enumerate(zip(worn, ANKLES, strict=False))
-    ] or [ca.SX(0), ca.SX(0)]
-    inputs = [q, v, a, k, strength, numbers]
-    return ca.Function("torques", inputs, [ca.vertcat(*muscle), ca.vertcat(*orthosis)])
-
-
-def _halves(numbers: ca.SX, sides: int) -> list[ca.SX]:
-    """Return the orthosis parameters of each side."""
-    return ca.vertsplit(numbers, numbers.numel() // sides) if sides else []
 
 
 def gait_series(walker: Walker, motion: PhasedMotion) -> GaitSeries:
     """Return the time series of a motion at its collocation points.
 
     Args:
-        walker: Who walks.
+        walker: Who walks; its unknowns take the values of the motion's parameters.
         motion: A motion of a gait problem: states (q, v), algebraic variables (accelerations,
             forces of the phase, reserves), smooth states (activations).
     """
-    parts = [_phase_series(phase) for phase in motion.phases]
+    walker = walker.with_parameters(motion.parameters)
+    parts = [_phase_series(walker, phase) for phase in motion.phases]
     starts = np.concatenate([[0.0], np.cumsum(motion.durations)])[:-1]
     time = np.concatenate([start + part["time"] for start, part in zip(starts, parts, strict=True)])
     names = tuple(p.name for p, part in zip(motion.phases, parts, strict=True) for _ in part["q"])
-    columns = {
-        key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key != "time"
-    }
-    torques = actuator_torques(walker)
-    first = _first_instant(walker, motion, torques)
-    columns = {key: np.concatenate([first[key], value]) for key, value in columns.items()}
-    stiffness = np.broadcast_to(motion.parameters[:, None], (motion.parameters.size, len(time) + 1))
-    muscle, orthosis = torques.map(len(time) + 1)(
-        columns["q"].T, columns["v"].T, columns["activation"].T, stiffness
-    )
+    first = _first_instant(walker, motion)
+    columns = {key: np.concatenate([first[key], *(part[key] for part in parts)]) for key in first}
     return GaitSeries(
         walker=walker,
         motion=motion,
         time=np.concatenate([[0.0], time]),
         phase=(motion.phases[0].name, *names),
-        muscle_torque=np.asarray(muscle).T,
-        orthosis_torque=np.asarray(orthosis).T,
-        stiffness=motion.parameters,
+        element_force=walker.element_forces(columns["q"], columns["v"], columns["activation"]),
         **columns,
     )
 
 
-def _phase_series(phase: PhaseMotion) -> dict[str, np.ndarray]:
+def _phase_series(walker: Walker, phase: PhaseMotion) -> dict[str, np.ndarray]:
     """Return the columns of one phase at its collocation points."""
     fractions = phase.point_fractions.ravel()
-    n, count = len(COORDINATES), fractions.size
+    n, count = walker.skeleton.size, fractions.size
     active = list(phase_named(phase.name).indices)
     states = phase.inner_states.reshape(count, -1)
     algebraic = phase.algebraic.reshape(count, -1)
-    force = np.zeros((count, len(CONTACT_FORCES)))
+    force = np.zeros((count, len(FORCES)))
     force[:, active] = algebraic[:, n : n + len(active)]
     return {
         "time": phase.duration * fractions,
@@ -205,14 +174,11 @@ def _phase_series(phase: PhaseMotion) -> dict[str, np.ndarray]:
     }
 
 
-def _first_instant(
-    walker: Walker, motion: PhasedMotion, torques: ca.Function
-) -> dict[str, np.ndarray]:
+def _first_instant(walker: Walker, motion: PhasedMotion) -> dict[str, np.ndarray]:
     """Return the columns at time 0, where there is no collocation point."""
-    phase, n = motion.phases[0], len(COORDINATES)
+    phase, n = motion.phases[0], walker.skeleton.size
     q, v, activation = phase.states[0, :n], phase.states[0, n:], phase.smooth[0]
-    muscle, orthosis = (np.asarray(k) for k in torques(q, v, activation, motion.parameters))
-    tau = walker.joint_torques(muscle, orthosis)
+    tau = walker.generalised_forces(walker.element_forces(q, v, activation))
     vdot, force = walker.contact_dynamics(phase.name, q, v, tau)
     values = {
         "q": q,

@@ -82,6 +82,7 @@ class Stride:
         net_torque: Sum of muscle and orthosis torques per coordinate [N m], shape (n, 10).
         muscle_torque: Torque of each generator [N m], shape (n, 14).
         orthosis_torque: Torques of the orthoses right, left [N m], shape (n, 2).
+        element_power: Powers of all force elements, muscles first [W], shape (n, k).
         activation: Activation of each generator, shape (n, 14).
         quadrature: Weights of an integral over time [s], shape (n,); trapezoids if left out.
         stiffness: K_D right, left, K_P right, left [N m/rad], shape (4,).
@@ -108,6 +109,7 @@ class Stride:
     net_torque: np.ndarray | None = None
     muscle_torque: np.ndarray | None = None
     orthosis_torque: np.ndarray | None = None
+    element_power: np.ndarray | None = None
     activation: np.ndarray | None = None
     quadrature: np.ndarray | None = None
     stiffness: np.ndarray | None = None
@@ -302,6 +304,7 @@ def stride_of(
         net_torque=series.net_torque,
         muscle_torque=series.muscle_torque,
         orthosis_torque=series.orthosis_torque,
+        element_power=series.element_power,
         activation=series.activation,
         quadrature=series.quadrature,
         stiffness=series.stiffness if series.stiffness.size else None,
@@ -372,7 +375,7 @@ def point_rows(side: Side) -> list[int]:
 
 def contacts(phase: tuple[str, ...]) -> np.ndarray:
     """Return whether each contact point is on the ground in each of n phases, shape (n, 4)."""
-    points = {name: phase_named(name).points for name in set(phase)}
+    points = {name: {p.name for p in phase_named(name).points} for name in set(phase)}
     return np.array([[p in points[name] for p in CONTACT_POINTS] for name in phase])
 
 

@@ -1,4 +1,4 @@
-"""How far one stiffness may move before the cost has risen by a given share, by solving again."""
+"""How far one number may move before the cost has risen by a given share, by solving again."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STRETCH: Final = 1.3
 """Multiple of a step up to which the limit of the range is tried at once."""
 
 Solve = Callable[[float, Optimum, bool], Optimum]
-"""Solves with the stiffness [N m/rad] prescribed, from a neighbour; whether to insist."""
+"""Solves with the number prescribed, from a neighbour; whether to insist."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Edge:
     """Where the cost has risen as far as allowed.
 
     Args:
-        stiffness: The stiffness [N m/rad].
+        value: The number [its unit].
         limit: Whether it is the limit of the range, with less than the allowed rise there.
         rise: Rise of the cost there, as a share.
         certain: Whether solves enclose it; otherwise it is the last one that was solved.
@@ -37,7 +37,7 @@ class Edge:
         iterations: Their iterations.
     """
 
-    stiffness: float
+    value: float
     limit: bool
     rise: float
     certain: bool
@@ -71,12 +71,12 @@ def find_edge(
     """Return where the cost has risen by a share, or the limit of the range.
 
     Args:
-        solve: Solves with the stiffness prescribed; the others follow.
+        solve: Solves with the number prescribed; the others follow.
         optimum: The optimum.
-        start: Its stiffness [N m/rad].
-        limit: The end of the range in the direction of the search [N m/rad].
+        start: Its value there.
+        limit: The end of the range in the direction of the search.
         share: Allowed rise of the cost relative to its size, e.g. 0.05.
-        step: Expected distance to the edge [N m/rad], positive.
+        step: Expected distance to the edge, positive.
         look: Whether to look at the limit for another optimum, where the edge lies before it.
     """
     search = _Search(optimum, start)

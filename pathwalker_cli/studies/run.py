@@ -11,7 +11,7 @@ from pathwalker_cli.config import StudyConfig, study_patient
 from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.nlp.ipopt import ProgressReport
+from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.results.metrics import RunInputs, patient_hash, run_inputs
 from pathwalker_cli.results.run_folder import (

@@ -51,9 +51,12 @@ def require_springs(config: StudyConfig, where: str) -> None:
 
 
 def spring_ranges(optimum: Optimum) -> dict[str, tuple[float, float]]:
-    """Return the allowed range of every spring [N m/rad]."""
-    lower, upper = optimum.solver.bounds.table.arrays(STIFFNESSES)
-    return dict(zip(STIFFNESSES, zip(lower.tolist(), upper.tolist(), strict=True), strict=True))
+    """Return the allowed range of every spring [N m/rad]; none where it follows another one."""
+    alone = optimum.solver.bounds.ranges
+    if all(name in alone for name in STIFFNESSES):
+        return {name: alone[name] for name in STIFFNESSES}
+    values = zip(STIFFNESSES, optimum.stiffness.tolist(), strict=True)
+    return {name: alone.get(name, (value, value)) for name, value in values}
 
 
 def free_springs(ranges: Ranges) -> tuple[str, ...]:

@@ -1,12 +1,11 @@
-"""How sure an identified stiffness is: its limits, the cost around it, stops, and real springs."""
+"""How sure an identified number is: its limits, the cost around it, stops, and real springs."""
 
 from __future__ import annotations
 
 import itertools
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from functools import partial
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -15,21 +14,22 @@ from pydantic import TypeAdapter, ValidationError
 from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.gait.bounds import held
 from pathwalker_cli.gait.neighbourhood import Neighbourhood
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.io.refusals import dotted
-from pathwalker_cli.model.walker import ANKLES
+from pathwalker_cli.model.elements.orthosis import AnkleOrthosis
+from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.patient.blocks import RealSpring
-from pathwalker_cli.results.text import spring_ends
+from pathwalker_cli.results.text import end_of
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.studies.edges import Edge, find_edge
-from pathwalker_cli.studies.springs import spring_ranges
 
 __all__ = [
     "SHARE",
+    "NumberVerdict",
     "SnappedSprings",
-    "SpringVerdict",
     "StopVerdict",
     "Verdict",
     "verdict_of",
@@ -50,25 +50,30 @@ _CANDIDATES: Final = 2
 
 
 @dataclass(frozen=True)
-class SpringVerdict:
-    """What is known of one spring; the other springs follow when it moves.
+class NumberVerdict:
+    """What is known of one identified number; the others follow when it moves.
 
     Args:
-        spring: Its name, as in `conventions.STIFFNESSES`.
-        stiffness: Identified stiffness [N m/rad].
-        range: Allowed stiffness [N m/rad].
+        name: Its name: of a spring as in `conventions.STIFFNESSES`, else of the unknown.
+        label: Its name for people.
+        unit: SI unit.
+        value: Identified value [unit].
+        range: Allowed values [unit].
         limit: "lower" or "upper" if it sits at a limit of its range, else "".
-        gradient: Relative change of the cost per N m/rad; 0 inside the range.
-        curvature: Relative second derivative of the cost [1/(N m/rad)^2].
-        region: Stiffness within which the cost stays within `SHARE` of the best [N m/rad].
+        gradient: Relative change of the cost per unit; 0 inside the range.
+        curvature: Relative second derivative of the cost [1/unit^2].
+        region: Values within which the cost stays within `SHARE` of the best [unit].
         open_ends: Whether the region reaches the lower and the upper limit of the range.
         certain: Whether solves enclose both ends of the region.
         again: Whether the cost is within `SHARE` again at the lower and the upper limit, beyond
             the region: another local optimum.
+        tied: Whether both sides are one number.
     """
 
-    spring: str
-    stiffness: float
+    name: str
+    label: str
+    unit: str
+    value: float
     range: tuple[float, float]
     limit: str
     gradient: float
@@ -77,6 +82,7 @@ class SpringVerdict:
     open_ends: tuple[bool, bool]
     certain: bool
     again: tuple[bool, bool] = (False, False)
+    tied: bool = False
 
     @property
     def prescribed(self) -> bool:
@@ -92,7 +98,7 @@ class SpringVerdict:
 
     @property
     def determined(self) -> str:
-        """How well least effort determines the spring, in words."""
+        """How well least effort determines the number, in words."""
         if self.prescribed:
             return "prescribed"
         if any(self.again) or self.width > _ROUGHLY:
@@ -146,6 +152,7 @@ class Verdict:
 
     Args:
         springs: Every spring, in the order of `conventions.STIFFNESSES`.
+        numbers: Every other number that was free to choose.
         stops: Every hard stop.
         snapped: The choice among real springs; None where the file lists none.
         optima: Other local optima within `SHARE` of the best.
@@ -154,7 +161,8 @@ class Verdict:
         seconds: Wall seconds it took.
     """
 
-    springs: tuple[SpringVerdict, ...]
+    springs: tuple[NumberVerdict, ...]
+    numbers: tuple[NumberVerdict, ...]
     stops: tuple[StopVerdict, ...]
     snapped: SnappedSprings | None
     optima: tuple[LocalOptimum, ...]
@@ -165,8 +173,11 @@ class Verdict:
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain values; SI units, shares of 1."""
         plain = asdict(self)
-        for entry, spring in zip(plain["springs"], self.springs, strict=True):
-            entry["determined"], entry["width"] = spring.determined, spring.width
+        for key in ("springs", "numbers"):
+            for entry, number in zip(plain[key], getattr(self, key), strict=True):
+                entry["determined"], entry["width"] = number.determined, number.width
+        for entry in plain["springs"]:
+            entry["spring"], entry["stiffness"] = entry.pop("name"), entry.pop("value")
         return plain
 
 
@@ -177,25 +188,28 @@ def verdict_of(solution: GaitSolution) -> Verdict | None:
         solution: A converged solution by collocation.
 
     Returns:
-        None where there is no spring to judge: barefoot, all springs prescribed, half a cycle
-        (where both sides are one), or a solution that is not one.
+        None where there is no number to judge: nothing free to choose, half a cycle (where both
+        sides are one), or a solution that is not one.
     """
     config = solution.config
-    if not solution.converged or config.condition != "orthosis":
+    if not solution.converged or not solution.walker.unknowns:
         return None
     if config.half_cycle or config.transcription != "collocation":
         return None
     began = time.perf_counter()
     resolver = Resolver(config, solution.last_motion, solution.nlp.multipliers)
     judge = _Judge(resolver)
-    if not judge.around.springs or not judge.optimum.converged:
+    if not judge.around.free or not judge.optimum.converged:
         return None
-    springs = tuple(map(judge.spring, STIFFNESSES))
+    verdicts = {unknown: judge.number(unknown) for unknown in judge.optimum.solver.walker.unknowns}
+    springs = tuple(_springs(verdicts))
+    names = {spring.name for spring in springs}
     snapped = judge.snapped()
     near = [o for o in solution.optima if o.converged]
     best = min((o.cost for o in near), default=0.0)
     return Verdict(
         springs=springs,
+        numbers=tuple(v for u, v in verdicts.items() if not names.intersection(_full_names(u))),
         stops=tuple(_stops(judge.optimum.series)),
         snapped=snapped,
         optima=tuple(o for o in near if o.cost <= best + SHARE * abs(best)),
@@ -216,7 +230,7 @@ def verdict_of_metrics(metrics: Mapping[str, Any]) -> Verdict | None:
         return None
     where, mend = "verdict in metrics.json", "solve again"
     try:
-        verdict = TypeAdapter(Verdict).validate_python(plain)
+        verdict = TypeAdapter(Verdict).validate_python(_renamed(plain))
     except ValidationError as problem:
         first = problem.errors()[0]
         what = f"{dotted(first['loc'])}: {first['msg'].lower()}"
@@ -227,19 +241,40 @@ def verdict_of_metrics(metrics: Mapping[str, Any]) -> Verdict | None:
     return verdict
 
 
+def _renamed(plain: Any) -> Any:
+    """Return plain values under the names of the fields; what is malformed stays."""
+    if not isinstance(plain, dict) or not isinstance(plain.get("springs"), list):
+        return plain
+    springs = []
+    for entry in plain["springs"]:
+        if isinstance(entry, dict):
+            entry = {"unit": "N m/rad", "label": "", **entry}
+            for old, new in (("spring", "name"), ("stiffness", "value")):
+                if old in entry:
+                    entry[new] = entry.pop(old)
+            entry["label"] = entry["label"] or _spring_label(str(entry.get("name")))
+        springs.append(entry)
+    return {"numbers": [], **plain, "springs": springs}
+
+
+def _spring_label(name: str) -> str:
+    known = {n.full_name: n for side in SIDES for n in AnkleOrthosis(side).numbers[:2]}
+    return Unknown.of(known[name]).label if name in known else name
+
+
 def _contradiction(verdict: Verdict) -> str:
     """Return what cannot be in a verdict that was read, "" if it is in order."""
-    names = {spring.spring for spring in verdict.springs}
+    names = {spring.name for spring in verdict.springs}
     snapped = verdict.snapped
     if not names <= set(STIFFNESSES):
         return f"names the spring {min(names - set(STIFFNESSES))}"
-    if snapped is not None and not snapped.names.keys() == snapped.stiffness.keys() == names:
+    if snapped is not None and not snapped.names.keys() == snapped.stiffness.keys() <= names:
         return "chooses real springs for others than were identified"
     if any(len(optimum.stiffness) < len(names) for optimum in verdict.optima):
         return "holds an optimum that lacks a stiffness"
-    for spring in verdict.springs:
-        if spring.range[0] > spring.range[1] or spring.limit not in ("", "lower", "upper"):
-            return f"holds a range or a limit of {spring.spring} that is none"
+    for number in (*verdict.springs, *verdict.numbers):
+        if number.range[0] > number.range[1] or number.limit not in ("", "lower", "upper"):
+            return f"holds a range or a limit of {number.name} that is none"
     return ""
 
 
@@ -257,90 +292,109 @@ class _Judge:
         """The config of the optimum."""
         return self.optimum.config
 
-    def spring(self, name: str) -> SpringVerdict:
-        """Return the verdict on one spring."""
-        ranges = spring_ranges(self.optimum)
-        stiffness = dict(zip(STIFFNESSES, self.optimum.stiffness.tolist(), strict=True))
-        if name not in self.around.springs:
-            only = (stiffness[name], stiffness[name])
-            return SpringVerdict(name, only[0], only, "", 0.0, 0.0, only, (True, True), True)
-        which = self.around.springs.index(name)
+    def number(self, unknown: Unknown) -> NumberVerdict:
+        """Return the verdict on one number."""
+        value, limits = self.optimum.value(unknown), self.optimum.range(unknown)
+        about = (unknown.name, unknown.label, unknown.unit, value)
+        tied = len(unknown.numbers) > 1
+        if unknown not in self.around.free:
+            only = (value, value)
+            return NumberVerdict(
+                *about, only, "", 0.0, 0.0, only, (True, True), certain=True, tied=tied
+            )
+        which = self.around.free.index(unknown)
         size = abs(self.optimum.cost)
         gradient = float(self.around.cost_gradient[which]) / size
-        curvature = self.around.curvature(name) / size
-        limit = spring_ends(stiffness, ranges).get(name, "")
+        curvature = self.around.curvature(unknown) / size
+        limit = end_of(value, limits)
         edges = []
-        for end, sign in zip(ranges[name], (-1.0, 1.0), strict=True):
+        for end, sign in zip(limits, (-1.0, 1.0), strict=True):
             if limit == {-1.0: "lower", 1.0: "upper"}[sign]:
                 edges.append(Edge(end, True, 0.0, True, 0, 0))
                 continue
             step = _quadratic_edge(sign * gradient if limit else 0.0, curvature)
-            edges.append(self._edge(name, stiffness[name], end, step, not limit))
-        return SpringVerdict(
-            name,
-            stiffness[name],
-            ranges[name],
+            edges.append(self._edge(unknown, value, end, step, not limit))
+        return NumberVerdict(
+            *about,
+            limits,
             limit,
             gradient if limit else 0.0,
             curvature,
-            (edges[0].stiffness, edges[1].stiffness),
+            (edges[0].value, edges[1].value),
             (edges[0].limit, edges[1].limit),
             all(edge.certain for edge in edges),
             (edges[0].again, edges[1].again),
+            tied,
         )
 
-    def _edge(self, name: str, start: float, end: float, step: float, look: bool) -> Edge:
+    def _edge(self, unknown: Unknown, start: float, end: float, step: float, look: bool) -> Edge:
         """Return an edge; a cost that slopes from a limit is not searched for another basin."""
-        held = partial(self._held, name)
-        edge = find_edge(held, self.optimum, start, end, SHARE, step, look)
+
+        def solve(value: float, near: Optimum, insist: bool) -> Optimum:
+            return self._solved({unknown: value}, near, insist)
+
+        edge = find_edge(solve, self.optimum, start, end, SHARE, step, look)
         self.solves += edge.solves
         return edge
 
-    def _held(self, name: str, stiffness: float, start: Optimum, insist: bool) -> Optimum:
-        return self._solved({name: stiffness}, start, insist)
-
     def _solved(
-        self, springs: dict[str, float], start: Optimum | None = None, insist: bool = True
+        self, values: Mapping[Unknown, float], start: Optimum | None = None, insist: bool = True
     ) -> Optimum:
-        """Return the neighbour with some springs prescribed."""
-        held = {name: [value, value] for name, value in springs.items()}
-        values = {**self.config.bounds.model_dump(mode="json")["stiffness"], **held}
-        config = with_values(self.config, {"bounds.stiffness": values})
+        """Return the neighbour with some numbers prescribed."""
+        config = with_values(self.config, held(self.config, values))
         return self.resolver.resolve(config, start, insist)
 
     def snapped(self) -> SnappedSprings | None:
         """Return the best choice among the springs that exist, solved again."""
-        real = self.optimum.solver.walker.patient.require_orthosis().springs
-        if real is None:
+        orthosis = self.optimum.solver.walker.patient.orthosis
+        if orthosis is None or orthosis.springs is None:
             return None
-        names = self.around.springs
-        stiffness = np.array([self.optimum.stiffness[STIFFNESSES.index(n)] for n in names])
-        ranges = spring_ranges(self.optimum)
+        kinds = {u: u.numbers[0].name.removesuffix("_stiffness") for u in self.around.free}
+        springs = [u for u, kind in kinds.items() if hasattr(orthosis.springs, kind)]
+        if not springs:
+            return None
         lists = [
-            _nearest(getattr(real, name.split("_")[0]), value, ranges[name])
-            for name, value in zip(names, stiffness, strict=True)
+            _nearest(
+                getattr(orthosis.springs, kinds[u]), self.optimum.value(u), self.optimum.range(u)
+            )
+            for u in springs
         ]
-        best = min(itertools.product(*lists), key=lambda choice: self._estimate(choice, stiffness))
-        springs = {name: spring.stiffness for name, spring in zip(names, best, strict=True)}
-        found = self._solved(springs)
+        choices = [dict(zip(springs, choice, strict=True)) for choice in itertools.product(*lists)]
+        best = min(choices, key=self._estimate)
+        found = self._solved({u: spring.stiffness for u, spring in best.items()})
         self.solves += 1
-        rise = self._estimate(best, stiffness)
+        rise = self._estimate(best)
         if found.converged:
             rise = found.cost - self.optimum.cost
         series = found.series
+        each = {name: spring for u, spring in best.items() for name in _full_names(u)}
         return SnappedSprings(
-            {name: spring.name for name, spring in zip(names, best, strict=True)},
-            springs,
+            {name: spring.name for name, spring in each.items()},
+            {name: spring.stiffness for name, spring in each.items()},
             rise / abs(self.optimum.cost),
             series.distance / series.duration,
             found.result.status,
         )
 
-    def _estimate(self, choice: Sequence[RealSpring], stiffness: np.ndarray) -> float:
+    def _estimate(self, choice: Mapping[Unknown, RealSpring]) -> float:
         """Return the rise of the cost to second order."""
-        moved = np.array([spring.stiffness for spring in choice]) - stiffness
-        around = self.around
-        return float(around.cost_gradient @ moved + moved @ around.cost_hessian @ moved / 2.0)
+        return self.around.rise(
+            {u: spring.stiffness - self.optimum.value(u) for u, spring in choice.items()}
+        )
+
+
+def _full_names(unknown: Unknown) -> tuple[str, ...]:
+    return tuple(number.full_name for number in unknown.numbers)
+
+
+def _springs(verdicts: Mapping[Unknown, NumberVerdict]) -> Iterator[NumberVerdict]:
+    """Yield the verdict on every spring, in order; tied ones share theirs."""
+    of = {name: (u, v) for u, v in verdicts.items() for name in _full_names(u)}
+    for name in STIFFNESSES:
+        if name in of:
+            unknown, verdict = of[name]
+            number = next(n for n in unknown.numbers if n.full_name == name)
+            yield replace(verdict, name=name, label=Unknown.of(number).label)
 
 
 def _quadratic_edge(slope: float, curvature: float) -> float:
@@ -360,11 +414,9 @@ def _nearest(
 
 def _stops(series: GaitSeries) -> Iterator[StopVerdict]:
     """Yield how far the ankles go into every hard stop."""
-    assert series.walker.orthosis is not None  # noqa: S101 - verdicts are for orthoses
-    weights = series.quadrature
-    rows = dict(zip(SIDES, ANKLES, strict=True))
-    for side, fixed in zip(SIDES, series.walker.orthosis, strict=True):
-        angle = series.q[:, rows[side]]
+    weights, walker = series.quadrature, series.walker
+    for side, element in walker.device.elements.items():
+        fixed, angle = element.fixed(walker.values), series.column(*element.coordinates)
         for stop, limit, sign in (
             ("dorsiflexion", fixed.dorsiflexion_stop, -1.0),
             ("plantarflexion", fixed.plantarflexion_stop, 1.0),

@@ -9,7 +9,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import STIFFNESSES, to_degrees
 from pathwalker_cli.stride.measures import measure_of
-from pathwalker_cli.studies.verdict import SHARE, SpringVerdict, StopVerdict, Verdict
+from pathwalker_cli.studies.verdict import SHARE, NumberVerdict, StopVerdict, Verdict
 
 __all__ = [
     "PRESCRIBED",
@@ -26,12 +26,13 @@ _BEATEN: Final = 1e-3
 PRESCRIBED: Final = "prescribed by the config, not identified"
 
 _SOFTER: Final = {"lower": ("softer", -1.0), "upper": ("stiffer", 1.0)}
+_LESS: Final = {"lower": ("less", -1.0), "upper": ("more", 1.0)}
 
 
 def verdict_lines(verdict: Verdict) -> Iterator[tuple[str, str]]:
     """Yield label and text of every line."""
-    for spring in verdict.springs:
-        yield measure_of(spring.spring).label, _spring(spring)
+    for number in (*verdict.springs, *verdict.numbers):
+        yield number.label, _number(number)
     reached = [stop for stop in verdict.stops if stop.excess > 0.0]
     yield "hard stops", "; ".join(map(stop_text, reached)) or "none is reached"
     if verdict.starts > 1:
@@ -47,41 +48,72 @@ def per_degree(stiffness: float) -> float:
     return float(np.deg2rad(stiffness))
 
 
-def _spring(spring: SpringVerdict) -> str:
-    low, high = spring.region
-    value = f"{spring.stiffness:.1f} N m/rad ({per_degree(spring.stiffness):.2f} N m/deg)"
-    if spring.prescribed:
+def shown(value: float, unit: str, second: bool = True) -> str:
+    """Return a number in the units in which people have it: angles in degrees.
+
+    Args:
+        value: The number [unit].
+        unit: SI unit.
+        second: Whether a stiffness is also given per degree.
+    """
+    if unit == "rad":
+        return f"{float(to_degrees(value)):.1f} deg"
+    if unit == "N m/rad":
+        each = f" ({per_degree(value):.2f} N m/deg)" if second else ""
+        return f"{value:.1f} N m/rad{each}"
+    return f"{value:.3g} {unit}"
+
+
+def _span(low: float, high: float, unit: str) -> str:
+    """Return a range like `shown`."""
+    if unit == "rad":
+        return f"{float(to_degrees(low)):.1f} to {float(to_degrees(high)):.1f} deg"
+    if unit == "N m/rad":
+        return (
+            f"{low:.1f} to {high:.1f} N m/rad ({per_degree(low):.2f} to {per_degree(high):.2f} "
+            "N m/deg)"
+        )
+    return f"{low:.3g} to {high:.3g} {unit}"
+
+
+def _number(number: NumberVerdict) -> str:
+    """Return what is known of a number."""
+    value = shown(number.value, number.unit)
+    if number.prescribed:
         return f"{value}: {PRESCRIBED}"
+    what = "springs that are" if number.unit == "N m/rad" else "range that is"
     text = (
-        f"{value}: {spring.determined}; the cost stays within {100 * SHARE:g} % of the best from "
-        f"{low:.1f} to {high:.1f} N m/rad ({per_degree(low):.2f} to {per_degree(high):.2f} "
-        f"N m/deg), {100 * spring.width:.0f} % of the springs that are allowed"
+        f"{value}: {number.determined}; the cost stays within {100 * SHARE:g} % of the best from "
+        f"{_span(*number.region, number.unit)}, {100 * number.width:.0f} % of the {what} allowed"
     )
-    return "; ".join([text, *reservations(spring)])
+    both = ["both sides are one number"] if number.tied else []
+    return "; ".join([text, *both, *reservations(number)])
 
 
-def reservations(spring: SpringVerdict) -> Iterator[str]:
-    """Yield what to know of a spring beside its region: other optima, limits, doubts."""
-    if spring.prescribed:
+def reservations(number: NumberVerdict) -> Iterator[str]:
+    """Yield what to know of a number beside its region: other optima, limits, doubts."""
+    if number.prescribed:
         return
-    far = [end for end, again in zip(spring.range, spring.again, strict=True) if again]
+    far = [end for end, again in zip(number.range, number.again, strict=True) if again]
     if far:
-        ends = " and ".join(f"{end:.1f}" for end in far)
-        yield f"the cost is as good again at {ends} N m/rad, another local optimum"
-    if spring.limit:
-        word, sign = _SOFTER[spring.limit]
-        saved = -100.0 * sign * spring.gradient * _ten_percent(spring)
+        ends = " and ".join(shown(end, number.unit, second=False) for end in far)
+        ends = ends.replace(" N m/rad and", " and")
+        yield f"the cost is as good again at {ends}, another local optimum"
+    if number.limit:
+        word, sign = (_SOFTER if number.unit == "N m/rad" else _LESS)[number.limit]
+        step = _noticeable(number)
+        saved = -100.0 * sign * number.gradient * step
         yield (
-            f"it sits at the {spring.limit} limit: {_ten_percent(spring):.1f} N m/rad {word} "
+            f"it sits at the {number.limit} limit: {shown(step, number.unit, second=False)} {word} "
             f"would save about {saved:.2g} % more"
         )
-    if not spring.certain:
+    if not number.certain:
         yield "the ends of this region are not certain: the problems beyond did not converge"
 
 
-def _ten_percent(spring: SpringVerdict) -> float:
-    """Return a tenth of the stiffness [N m/rad]: a step that makes a difference to a hand."""
-    return 0.1 * spring.stiffness
+def _noticeable(number: NumberVerdict) -> float:
+    """Return a step that makes a difference to a hand: a tenth of the number, or a degree."""
+    return float(np.deg2rad(1.0)) if number.unit == "rad" else 0.1 * abs(number.value)
 
 
 def stop_text(stop: StopVerdict) -> str:
@@ -101,9 +133,9 @@ def _optima(verdict: Verdict) -> str:
     for spring in verdict.springs:
         if spring.prescribed:
             continue
-        row = STIFFNESSES.index(spring.spring)
+        row = STIFFNESSES.index(spring.name)
         values = [optimum.stiffness[row] for optimum in verdict.optima]
-        spread.append(f"{measure_of(spring.spring).label} {min(values):.0f} to {max(values):.0f}")
+        spread.append(f"{measure_of(spring.name).label} {min(values):.0f} to {max(values):.0f}")
     return f"{text}, with {', '.join(spread)} N m/rad"
 
 

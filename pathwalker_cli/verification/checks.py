@@ -285,8 +285,9 @@ def _solution(run: Run, solver: GaitSolver) -> Iterator[Check]:
     motion = replace(run.motion, phases=phases)
     program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)
     unknowns = program.to_unknowns(motion)
-    if unknowns.size != run.multipliers.unknowns.size or (
-        program.program.rows != run.multipliers.rows.size
+    if (program.size, program.rows) != (
+        run.multipliers.unknowns.size,
+        run.multipliers.rows.size,
     ):
         yield Check("optimality", math.inf, 0.0, "", "multipliers of another program")
         return

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side, to_degrees
 from pathwalker_cli.errors import InputError
-from pathwalker_cli.model.orthosis import OrthosisSide, orthosis_torque
+from pathwalker_cli.model.elements.orthosis import OrthosisSide, orthosis_torque
 from pathwalker_cli.stride.figures.curves import Reference
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,

@@ -6,16 +6,18 @@ No problem is solved again, except where a check by finite differences is asked 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 from pathwalker_cli.config import StudyConfig, with_values
-from pathwalker_cli.conventions import SIDES, STIFFNESSES
+from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import ConfigError, NotConvergedError
+from pathwalker_cli.gait.bounds import held
 from pathwalker_cli.gait.neighbourhood import Derivative, Neighbourhood
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import SegmentLengths, Strengths
 from pathwalker_cli.results.run_folder import Run
@@ -68,14 +70,18 @@ def default_places(patient: Patient, worn: bool) -> tuple[str, ...]:
 
 
 def asked_places(
-    asked: SensitivityStudy, springs: tuple[str, ...], patient: Patient, worn: bool
+    asked: SensitivityStudy, free: Sequence[Unknown], patient: Patient, worn: bool
 ) -> tuple[str, ...]:
-    """Return the numbers that a study asks about: free springs and places in the patient's file.
+    """Return the numbers that a study asks about: those that are free, and places in the file.
+
+    A place whose number the problem chooses itself changes nothing, and is left out.
 
     Raises:
         ConfigError: If a check is asked for what is not asked about.
     """
-    places = (*springs, *(asked.places or default_places(patient, worn)))
+    chosen = {place for u in free for place in (u.address, *u.addresses)}
+    usual = (place for place in default_places(patient, worn) if place not in chosen)
+    places = (*(u.name for u in free), *(asked.places or usual))
     unknown = [place for place in asked.check if place not in places]
     if unknown:
         raise ConfigError(f"names {unknown[0]}", where="check", allowed=", ".join(places))
@@ -101,7 +107,7 @@ def sensitivities(asked: SensitivityStudy, run: Run, folder: Path) -> Sensitivit
     began = time.perf_counter()
     patient = around.optimum.solver.walker.patient
     worn = config.condition == "orthosis"
-    places = asked_places(asked, around.springs, patient, worn)
+    places = asked_places(asked, around.free, patient, worn)
     base = all_measures(around.optimum)
     rows = tuple(_sensitivity(around, place, base) for place in places)
     seconds = time.perf_counter() - began
@@ -115,10 +121,9 @@ def sensitivities(asked: SensitivityStudy, run: Run, folder: Path) -> Sensitivit
 
 def _sensitivity(around: Neighbourhood, place: str, base: Mapping[str, float]) -> Sensitivity:
     """Return the answer to one number."""
-    value = _value(around.optimum, place)
-    if place in STIFFNESSES:
-        assert value is not None  # noqa: S101 - a spring has a value
-        found, unit = around.by_spring(place), value
+    value, unknown = _value(around.optimum, place), _unknown(around.optimum, place)
+    if unknown is not None:
+        found, unit = around.by_unknown(unknown), around.optimum.value(unknown)
     else:
         found, unit = around.by_factor(place), 1.0
     derivatives = {key: unit * slope for key, slope in _slopes(found).items()}
@@ -134,10 +139,15 @@ def _slopes(found: Derivative) -> dict[str, float]:
     return {**slopes, "cost": found.cost}
 
 
+def _unknown(optimum: Optimum, place: str) -> Unknown | None:
+    """Return the unknown of that name, None where it is a place in the patient's file."""
+    return next((unknown for unknown in optimum.free if unknown.name == place), None)
+
+
 def _value(optimum: Optimum, place: str) -> float | None:
     """Return the number at a place, None where there are several."""
-    if place in STIFFNESSES:
-        return float(optimum.stiffness[STIFFNESSES.index(place)])
+    if (unknown := _unknown(optimum, place)) is not None:
+        return optimum.value(unknown)
     value: Any = optimum.solver.walker.patient
     for part in place.split("."):
         value = getattr(value, part, None)
@@ -170,8 +180,7 @@ def _check(
 def _moved(optimum: Optimum, place: str, factor: float) -> dict[str, Any]:
     """Return config values with one number scaled."""
     config = optimum.config
-    if place in STIFFNESSES:
-        stiffness = factor * float(optimum.stiffness[STIFFNESSES.index(place)])
-        return {"bounds.stiffness": {**config.bounds.stiffness, place: [stiffness, stiffness]}}
+    if (unknown := _unknown(optimum, place)) is not None:
+        return held(config, {unknown: factor * optimum.value(unknown)})
     scale = dict(config.variation.scale)
     return {"variation.scale": {**scale, place: factor * scale.get(place, 1.0)}}

@@ -17,7 +17,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-__all__ = ["BezierChain", "BezierPoint", "evaluate", "newton_steps_for"]
+__all__ = ["BezierChain", "BezierPoint", "SignedCurve", "evaluate", "newton_steps_for"]
 
 _MOST_NEWTON_STEPS = 9
 """Enough for 1e-14 on every corner in use; the flattest are the eccentric velocity curves."""
@@ -91,6 +91,28 @@ def evaluate(chain: BezierChain, x: Any) -> BezierPoint:
         return BezierPoint(*_function(chain).call([x], True, False))
     controls = [chain.controls(i) for i in range(len(chain.x) - 1)]
     return _evaluated(chain, controls, x)
+
+
+@dataclass(frozen=True)
+class SignedCurve:
+    """A curve of sign * x.
+
+    Args:
+        chain: The curve.
+        sign: +1 or -1.
+    """
+
+    chain: BezierChain
+    sign: float
+
+    def __call__(self, x: Any) -> Any:
+        """Return the value at x, shaped like x."""
+        return evaluate(self.chain, self.sign * x).value
+
+    def expansion(self, x: Any) -> tuple[Any, Any, Any]:
+        """Return value, first and second derivative at x."""
+        point = evaluate(self.chain, self.sign * x)
+        return point.value, self.sign * point.slope, point.curvature
 
 
 @lru_cache(maxsize=64)

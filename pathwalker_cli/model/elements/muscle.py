@@ -9,6 +9,7 @@ References:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
@@ -16,8 +17,10 @@ from typing import Any, Final
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.conventions import GENERATORS, generator_coordinate
-from pathwalker_cli.model.curves import BezierChain, evaluate, newton_steps_for
+from pathwalker_cli.conventions import GENERATORS, SIDES, SUFFIX, generator_coordinate
+from pathwalker_cli.model.elements import Curve, State, plain
+from pathwalker_cli.model.elements.curves import BezierChain, SignedCurve, newton_steps_for
+from pathwalker_cli.model.numbers import Number
 
 __all__ = [
     "ACTIVATION_TIME",
@@ -155,15 +158,35 @@ class MuscleTorqueGenerator:
         """Coordinate that the generator drives."""
         return generator_coordinate(self.name)
 
-    def angle_factor(self, q: Any) -> Any:
-        """Return f_A at the joint angle q [rad], dimensionless."""
-        return evaluate(self.curves.active_torque_angle, self.angle_sign * q).value
+    @property
+    def coordinates(self) -> tuple[str]:
+        """The coordinate that the generator drives, as an element has it."""
+        return (self.coordinate,)
 
-    def velocity_factor(self, v: Any) -> Any:
-        """Return f_V at the joint speed v [rad/s], dimensionless."""
-        return evaluate(self.curves.torque_angular_velocity, self.torque_sign * v).value
+    @cached_property
+    def numbers(self) -> tuple[Number]:
+        """Its strength, the maximum isometric torque tau_0."""
+        stem, _, suffix = self.name.rpartition("_")
+        side = next((s for s in SIDES if SUFFIX[s] == suffix), None)
+        kind = self.name if side is None else stem
+        place = f"strengths.{kind}"
+        words = f"strength of {kind.replace('_', ' ')}"
+        address = place if side is None else f"{place}.{side}"
+        return (Number(address, f"{kind}_strength", words, "N m", side),)
 
-    def torque(self, q: Any, v: Any, activation: Any, max_isometric_torque: Any) -> Any:
+    @cached_property
+    def angle_factor(self) -> SignedCurve:
+        """f_A as a function of the joint angle q [rad], dimensionless."""
+        return SignedCurve(self.curves.active_torque_angle, self.angle_sign)
+
+    @cached_property
+    def velocity_factor(self) -> SignedCurve:
+        """f_V as a function of the joint speed v [rad/s], dimensionless."""
+        return SignedCurve(self.curves.torque_angular_velocity, self.torque_sign)
+
+    def torque(
+        self, q: Any, v: Any, activation: Any, max_isometric_torque: Any, curve: Curve = plain
+    ) -> Any:
         """Return the signed joint torque [N m], equation (1).
 
         Args:
@@ -171,9 +194,19 @@ class MuscleTorqueGenerator:
             v: Joint speed [rad/s].
             activation: Activation in [0, 1].
             max_isometric_torque: tau_0 [N m], positive.
+            curve: Evaluates the two curves.
         """
-        factor = self.angle_factor(q) * self.velocity_factor(v)
+        factor = curve(self.angle_factor, q) * curve(self.velocity_factor, v)
         return self.torque_sign * max_isometric_torque * activation * factor
+
+    def forces(
+        self, state: State, numbers: Mapping[str, Any], curve: Curve = plain
+    ) -> tuple[Any, ...]:
+        """Return the signed joint torque [N m]; see `ForceElement.forces`."""
+        (strength,) = self.numbers
+        q, v = state.q[self.coordinate], state.v[self.coordinate]
+        a = state.activation[self.name]
+        return (self.torque(q, v, a, numbers[strength.address], curve),)
 
 
 def generators() -> tuple[MuscleTorqueGenerator, ...]:

@@ -1,4 +1,4 @@
-"""The five-stage torque-angle curve of the ankle-foot orthosis, built from its stiffnesses.
+"""The ankle-foot orthosis as a force element: a five-stage torque-angle curve at the ankle.
 
 References:
     Sreenivasa et al. (2017), figure 2 and table 2.
@@ -6,12 +6,17 @@ References:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Final
 
-from pathwalker_cli.model.curves import BezierChain, evaluate
+from pathwalker_cli.model.elements import Curve, State, plain
+from pathwalker_cli.model.elements.curves import BezierChain, evaluate
+from pathwalker_cli.model.numbers import Number
+from pathwalker_cli.model.skeleton import SUFFIX, Side
 
-__all__ = ["OrthosisSide", "orthosis_curve", "orthosis_torque"]
+__all__ = ["AnkleOrthosis", "OrthosisSide", "orthosis_curve", "orthosis_torque"]
 
 _CURVINESS: Final = 0.7
 _BLEND: Final = 0.1
@@ -135,3 +140,81 @@ def orthosis_torque(side: OrthosisSide, angle: Any, k_d: Any, k_p: Any) -> Any:
         k_p: Plantarflexion stiffness K_P [N m/rad].
     """
     return -evaluate(orthosis_curve(side, k_d, k_p), angle).value
+
+
+_NUMBERS: Final = (
+    ("stiffness_guess.dorsiflexion", "dorsiflexion_stiffness", "K_D", "N m/rad"),
+    ("stiffness_guess.plantarflexion", "plantarflexion_stiffness", "K_P", "N m/rad"),
+    ("neutral_angle", "neutral_angle", "neutral angle", "rad"),
+    ("free_play", "free_play", "free play", "rad"),
+    ("preload_torque", "preload_torque", "preload", "N m"),
+    ("dorsiflexion_stop", "dorsiflexion_stop", "dorsiflexion stop", "rad"),
+    ("plantarflexion_stop", "plantarflexion_stop", "plantarflexion stop", "rad"),
+    (
+        "stop_stiffness.dorsiflexion",
+        "dorsiflexion_stop_stiffness",
+        "dorsiflexion stop stiffness",
+        "N m/rad",
+    ),
+    (
+        "stop_stiffness.plantarflexion",
+        "plantarflexion_stop_stiffness",
+        "plantarflexion stop stiffness",
+        "N m/rad",
+    ),
+)
+"""Place below `orthosis` in the patient's file, name, label and unit of every number: both springs,
+then the fields of `OrthosisSide`."""
+
+
+@dataclass(frozen=True)
+class AnkleOrthosis:
+    """The orthosis of one side as a force element.
+
+    Args:
+        side: "right" or "left".
+    """
+
+    side: Side
+
+    @property
+    def name(self) -> str:
+        """Its name, e.g. "orthosis_r"."""
+        return f"orthosis_{SUFFIX[self.side]}"
+
+    @property
+    def coordinates(self) -> tuple[str]:
+        """The ankle."""
+        return (f"ankle_{SUFFIX[self.side]}",)
+
+    @cached_property
+    def numbers(self) -> tuple[Number, ...]:
+        """K_D and K_P, then the fields of `OrthosisSide` in order."""
+        return tuple(
+            Number(
+                f"orthosis.{place}.{self.side}", name, label, unit, self.side, faded=unit != "rad"
+            )
+            for place, name, label, unit in _NUMBERS
+        )
+
+    def fixed(self, numbers: Mapping[str, Any]) -> OrthosisSide:
+        """Return all but the springs, from numbers by address."""
+        return OrthosisSide(*(numbers[number.address] for number in self.numbers[2:]))
+
+    def springs(self, numbers: Mapping[str, Any]) -> tuple[Any, Any]:
+        """Return K_D and K_P [N m/rad], from numbers by address."""
+        k_d, k_p = (numbers[number.address] for number in self.numbers[:2])
+        return k_d, k_p
+
+    def forces(
+        self, state: State, numbers: Mapping[str, Any], curve: Curve = plain
+    ) -> tuple[Any, ...]:
+        """Return the torque on the ankle [N m]; see `ForceElement.forces`."""
+        (ankle,) = self.coordinates
+        values = [numbers[number.address] for number in self.numbers]
+        return (curve(_torque, state.q[ankle], *values),)
+
+
+def _torque(angle: Any, k_d: Any, k_p: Any, *fixed: Any) -> Any:
+    """Return `orthosis_torque` with all numbers in a row, in the order of `_NUMBERS`."""
+    return orthosis_torque(OrthosisSide(*fixed), angle, k_d, k_p)

@@ -1,0 +1,106 @@
+"""Bodies and joints as data: the names, the order and the kinds of generalised coordinates.
+
+World frame: x forward, z up, rotations about +y (right-hand rule), SI units and radians.
+Positive: pelvis_tilt and lumbar = forward lean, hip = extension, knee = flexion,
+ankle = plantarflexion.  The zero pose is upright with straight legs and feet at 90 degrees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, Literal
+
+__all__ = ["PLANAR_WALKER", "SIDES", "SUFFIX", "Joint", "Side", "Skeleton"]
+
+Side = Literal["right", "left"]
+SIDES: Final[tuple[Side, Side]] = ("right", "left")
+SUFFIX: Final[dict[str, str]] = {"right": "r", "left": "l"}
+"""Suffix of a side in coordinate and link names."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of one degree of freedom.
+
+    Args:
+        coordinate: Name of its generalised coordinate.
+        parent: Link that carries it.
+        child: Link that it moves.
+        axis: Axis of the joint frame along or about which it moves.
+        slides: Whether it is a slider [m], not a hinge [rad].
+        side: The side that it belongs to; None on the midline.
+        actuated: Whether muscles act on it; nothing drives the free pelvis.
+    """
+
+    coordinate: str
+    parent: str
+    child: str
+    axis: Literal["x", "y", "z"] = "y"
+    slides: bool = False
+    side: Side | None = None
+    actuated: bool = True
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Joints in the order of the generalised coordinates, parents before children.
+
+    Args:
+        joints: The joints.
+    """
+
+    joints: tuple[Joint, ...]
+
+    @cached_property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of all generalised coordinates in order."""
+        return tuple(joint.coordinate for joint in self.joints)
+
+    @cached_property
+    def translations(self) -> tuple[str, ...]:
+        """Coordinates in metres; all others are angles."""
+        return tuple(joint.coordinate for joint in self.joints if joint.slides)
+
+    @cached_property
+    def angles(self) -> tuple[str, ...]:
+        """Coordinates in radians, in order."""
+        return tuple(joint.coordinate for joint in self.joints if not joint.slides)
+
+    @cached_property
+    def root(self) -> tuple[str, ...]:
+        """Coordinates that no actuator drives: where and how the pelvis is."""
+        return tuple(joint.coordinate for joint in self.joints if not joint.actuated)
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self.joints)
+
+    def index(self, coordinate: str) -> int:
+        """Return the position of a coordinate."""
+        return self.coordinates.index(coordinate)
+
+
+def _leg(side: Side) -> tuple[Joint, ...]:
+    s = SUFFIX[side]
+    return (
+        Joint(f"hip_{s}", "pelvis", f"thigh_{s}", side=side),
+        Joint(f"knee_{s}", f"thigh_{s}", f"shank_{s}", side=side),
+        Joint(f"ankle_{s}", f"shank_{s}", f"foot_{s}", side=side),
+    )
+
+
+PLANAR_WALKER: Final = Skeleton(
+    (
+        Joint("pelvis_tx", "world", "pelvis_tx_slider", "x", slides=True, actuated=False),
+        Joint(
+            "pelvis_tz", "pelvis_tx_slider", "pelvis_tz_slider", "z", slides=True, actuated=False
+        ),
+        Joint("pelvis_tilt", "pelvis_tz_slider", "pelvis", actuated=False),
+        *_leg("right"),
+        *_leg("left"),
+        Joint("lumbar", "pelvis", "trunk"),
+    )
+)
+"""The sagittal walker of Sreenivasa et al. (2017): two translations, eight angles."""
