@@ -98,7 +98,7 @@ def test_any_value_in_the_metrics_of_a_run(run: Path, tmp_path: Path) -> None:
     before = file.read_text(encoding="utf-8")
 
     def read() -> None:
-        verdict = verdict_of_metrics(run_folder._read_metrics(run)[0])
+        verdict = verdict_of_metrics(run_folder._read_metrics(run))
         if verdict is not None:
             list(verdict_lines(verdict))
 

@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -84,7 +85,6 @@ class Run:
     Args:
         folder: Where it stands.
         metrics: Content of `metrics.json`, by key.
-        result: The same, typed.
         motion: The exact motion.
         config: The config with all defaults filled in.
         multipliers: Multipliers of the solution by collocation; None if they were not kept.
@@ -92,10 +92,14 @@ class Run:
 
     folder: Path
     metrics: dict[str, Any]
-    result: RunMetrics
     motion: PhasedMotion
     config: StudyConfig
     multipliers: Multipliers | None = None
+
+    @cached_property
+    def result(self) -> RunMetrics:
+        """The same metrics, typed."""
+        return RunMetrics.model_validate(self.metrics)
 
 
 def config_text(config: StudyConfig) -> str:
@@ -294,24 +298,24 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
         NotConvergedError: If the run did not converge.
     """
     folder = Path(folder)
-    metrics, result = _read_metrics(folder)
-    if (result.status != "converged" or (folder / _SEAL).exists()) and not allow_unconverged:
+    metrics = _read_metrics(folder)
+    if (metrics["status"] != "converged" or (folder / _SEAL).exists()) and not allow_unconverged:
         raise NotConvergedError(
-            f"{folder}: {result.problem} did not converge there ({result.status}); "
+            f"{folder}: {metrics['problem']} did not converge there ({metrics['status']}); "
             "its last iterate is no solution"
         )
     motion = read_motion(folder / _MOTION)
-    _check_hash(folder / _MOTION, result.motion_hash)
+    _check_hash(folder / _MOTION, metrics["motion_hash"])
     multipliers = None
     if (folder / _MULTIPLIERS).exists():
         multipliers = read_multipliers(folder / _MULTIPLIERS)
-        _check_hash(folder / _MULTIPLIERS, result.multipliers_hash)
+        _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
     config = load_config(_file(folder, CONFIG))
     expected = len(STIFFNESSES) if config.condition == "orthosis" else 0
-    if config.problem != result.problem or motion.parameters.size != expected:
+    if config.problem != metrics["problem"] or motion.parameters.size != expected:
         where = str(folder / CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)
-    return Run(folder, metrics, result, motion, config, multipliers)
+    return Run(folder, metrics, motion, config, multipliers)
 
 
 def repeatable_config(run: Run) -> StudyConfig:
@@ -340,8 +344,8 @@ def _file(folder: Path, name: str) -> Path:
     return path
 
 
-def _read_metrics(folder: Path) -> tuple[dict[str, Any], RunMetrics]:
-    """Return the metrics of a run, by key and typed."""
+def _read_metrics(folder: Path) -> dict[str, Any]:
+    """Return the metrics of a run."""
     path = _file(folder, _METRICS)
     metrics = read_json(path, mend="solve again")
     if "run_format" not in metrics:
@@ -350,7 +354,8 @@ def _read_metrics(folder: Path) -> tuple[dict[str, Any], RunMetrics]:
     if metrics["run_format"] != RUN_FORMAT:
         raise DataError(f"has run_format {metrics['run_format']}", where=str(path),
                         allowed=str(RUN_FORMAT), mend="solve again")  # fmt: skip
-    return metrics, validate(metrics, RunMetrics, where=str(path), error=DataError)
+    validate(metrics, RunMetrics, where=str(path), error=DataError)
+    return metrics
 
 
 def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
