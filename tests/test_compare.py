@@ -21,6 +21,8 @@ from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report.compare import Compared, compare_runs, comparison_lines
+from pathwalker_cli.results.metrics import RunMetrics
+from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.measures import measure_of
 from report_runs import write_made_run
 
@@ -252,3 +254,11 @@ def test_labels_are_never_formulas_nor_hidden(runs: Path) -> None:
 def test_an_active_bound_comes_back_from_its_text(bound: ActiveBound) -> None:
     assert ActiveBound.parsed(str(bound)) == bound
     assert ActiveBound.parsed("knee") is None
+
+
+def test_active_bounds_of_older_runs_are_read_from_their_text(runs: Path) -> None:
+    run = load_run(runs / "mapd-orthosis")
+    older = RunMetrics.model_validate({k: v for k, v in run.metrics.items() if k != "active"})
+    assert older.active is None
+    assert older.bounds == run.result.bounds
+    assert run.result.bounds[0] == ActiveBound("knee_l", "lower", 0.264, ("left_toe",))

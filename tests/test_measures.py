@@ -19,7 +19,7 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.conventions import GRAVITY
 from pathwalker_cli.evaluation import figures
 from pathwalker_cli.gait.resolve import Optimum
-from pathwalker_cli.report.gait_table import gait_section
+from pathwalker_cli.report.gait_page import gait_section
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.results.text import summary, summary_rows
 from pathwalker_cli.stride import measures as registry
