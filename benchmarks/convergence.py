@@ -15,7 +15,6 @@ from typing import Final
 import numpy as np
 from matplotlib import rc_context
 
-from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.solve import GaitSolver
@@ -60,8 +59,7 @@ def study(run_folder: Path) -> list[Point]:
     before: tuple[CollocationProgram, NlpResult] | None = None
     motion, points = run.motion, []
     for degree in reversed(DEGREES):
-        config = _with_degree(run.config, degree)
-        solver = GaitSolver(config)
+        solver = GaitSolver(run.case.with_values({"mesh.degree": degree}))
         for intervals in reversed(INTERVALS):
             meshes = meshing.by_duration(run.motion.durations, intervals, 2)
             barrier = 1e-4 if before is None else 1e-6
@@ -86,10 +84,6 @@ def study(run_folder: Path) -> list[Point]:
             )
             print(points[-1], flush=True)
     return points
-
-
-def _with_degree(config: StudyConfig, degree: int) -> StudyConfig:
-    return config.model_copy(update={"mesh": config.mesh.model_copy(update={"degree": degree})})
 
 
 def orders(points: list[Point]) -> dict[int, float]:

@@ -58,6 +58,8 @@ _SPRINGS: Final = (
 MEANINGS: Final = {
     "id": "name of the patient, of run folders and of table rows",
     "description": "for people",
+    "numbers": "values of further numbers of the model by address, e.g. of a force element of one's own; one without "
+    "side counts for both",
     "sex": "segment masses follow from boys in either case; for a girl every run says so",
     "age": "segment masses follow from it",
     "age_for_regressions": "age for the segment masses, if another one fits better, or the child is younger or "

@@ -47,8 +47,8 @@ FILES: Final = {
     "torques.csv": "torques of muscles and orthoses over time",
     "figures": f"{', '.join(f'`{name}`' for name in FIGURES)}; PNG and SVG. `orthosis_curves` with orthoses only",
     "config.resolved.yaml": "the config of the run with every default and override written out; can be solved again",
-    "patient.yaml": "the patient as read, before any variation of the config, the orthosis in its place; with it the "
-    "folder is enough to [verify and repeat](verification.md) the run",
+    "patient.yaml": "the patient as read, before any variation of the config, the orthosis in its place; whatever "
+    "stands on the run takes this one, and with it the folder is enough to [verify and repeat](verification.md) the run",
     "recordings": "the recording that a run began with or followed; only then",
     "log.txt": "input hashes, every stage and iteration, the verdict on the springs",
     "motion.npz": "the exact motion on its mesh, [see below](#motionnpz); what `--warm-start` reads",

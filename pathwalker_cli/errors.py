@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import Self
 
 __all__ = [
     "BackendError",
@@ -45,6 +46,10 @@ class InputError(PathwalkerError):
             parts.append(mend)
         super().__init__(_one_line("; ".join(parts)))
 
+    def at(self, where: str) -> Self:
+        """Return the same error at another place."""
+        return type(self)(self.what, where=where, allowed=self.allowed, mend=self.mend)
+
 
 def _one_line(text: str) -> str:
     """Return a text with line ends and control characters, e.g. from a file, as their codes."""
@@ -71,7 +76,7 @@ def placed(where: str) -> Iterator[None]:
     except InputError as error:
         inner = error.where
         place = inner if inner.startswith(where) else f"{where}: {inner}" if inner else where
-        raise type(error)(error.what, where=place, allowed=error.allowed, mend=error.mend) from None
+        raise error.at(place) from None
 
 
 class ConfigError(InputError):

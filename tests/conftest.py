@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from figure_measure import complaints
 from helpers import stylised_series, walker_of
+from pathwalker_cli.case import Case
 from pathwalker_cli.config import load_config
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.solution import GaitSolution, StageRecord
@@ -95,16 +96,16 @@ def made_solution() -> MadeSolution:
     """Return a function that makes the end of a solve out of the stylised gait."""
 
     def make(problem: str = "mapd-orthosis", **changes: Any) -> GaitSolution:
-        config = load_config(problem)
+        case = changes.get("case") or Case.of(changes.pop("config", None) or load_config(problem))
         walker = walker_of(PROBLEMS[problem].condition)
         errors = (np.array([2e-4, 5e-4]), np.array([3e-4]))
         solution = GaitSolution(
-            config=config,
+            case=case,
             walker=walker,
             status="converged",
             last_motion=(stylised_series(PROBLEMS[problem].condition).motion),
             nlp=made_result(),
-            bounds=gait_bounds(walker, config.bounds),
+            bounds=gait_bounds(walker, case.config.bounds),
             cost=0.4,
             cost_terms={"effort_per_distance": 0.4},
             violations=(Violation("knee_r rate in right_toe at 50 % of the phase", 2e-9),),

@@ -8,13 +8,14 @@ import signal
 import time
 from pathlib import Path
 
+from pathwalker_cli.case import Case
 from pathwalker_cli.studies.batch.worker import Result
 
 SHORT = 0.2
 """Time that the work takes [s]."""
 
 
-def fake_work(config: str, folder: str, warm_start: str) -> Result:
+def fake_work(case: Case, folder: str, warm_start: str) -> Result:
     """Write metrics that follow from the config, die, fail or hang."""
     place = Path(folder)
     kind = place.name.rpartition("--")[2]
@@ -25,10 +26,9 @@ def fake_work(config: str, folder: str, warm_start: str) -> Result:
         raise ZeroDivisionError("a bug")
     if kind == "hangs":
         time.sleep(600)
-    content = json.loads(config)
     metrics = {
         "status": "the iteration limit was reached" if kind == "is_hard" else "converged",
-        "cost": content["bounds"]["friction"] / 3,
+        "cost": case.config.bounds.friction / 3,
         "walking_speed": 0.7,
         "dorsiflexion_stiffness_right": None,
         "largest_violation": 1e-10,

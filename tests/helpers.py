@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, Condition
-from pathwalker_cli.gait.problem import INTEGRALS
+from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.gait.stylised import StylisedGait, stylised_trajectory
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 from pathwalker_cli.model.walker import Walker, build_walker
@@ -66,7 +66,7 @@ def _phase(
         states=nodes,
         smooth=np.full((INTERVALS + 1, len(GENERATORS)), ACTIVATION),
         controls=np.zeros((INTERVALS + 1, len(GENERATORS))),
-        integrals=np.zeros((INTERVALS + 1, len(INTEGRALS))),
+        integrals=np.zeros((INTERVALS + 1, len(Costs().integrals))),
         inner_states=inner.reshape(INTERVALS, DEGREE, -1),
         algebraic=algebraic,
     )

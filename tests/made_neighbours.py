@@ -12,7 +12,8 @@ import numpy as np
 
 from conftest import made_result
 from helpers import stylised_series, walker_of
-from pathwalker_cli.config import StudyConfig, load_config
+from pathwalker_cli.case import Case, load_case
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.nlp.ipopt import NlpResult
@@ -31,9 +32,13 @@ Fails = Callable[[StudyConfig], bool]
 class MadeOptimum:
     """What the studies ask of a neighbour; its basin is the first of its unknowns."""
 
-    config: StudyConfig
+    case: Case
     result: NlpResult
     errors: tuple[float, float] = (5e-4, 5e-3)
+
+    @property
+    def config(self) -> StudyConfig:
+        return self.case.config
 
     @property
     def converged(self) -> bool:
@@ -71,42 +76,42 @@ def speed(config: StudyConfig) -> float:
     return 0.636 + 0.2 * max(config.cost.walking_speed_weight - 0.5, 0.0)
 
 
-def effort(config: StudyConfig, basin: float) -> float:
-    """Return effort per distance [s/m] over the springs and the speed of a config."""
-    springs = MadeOptimum(config, made_result()).stiffness
+def effort(case: Case, basin: float) -> float:
+    """Return effort per distance [s/m] over the springs and the speed of a case."""
+    springs = MadeOptimum(case, made_result()).stiffness
     away = np.abs(np.log(springs / FREE)).sum()
-    return 0.26 * (1.0 + 0.05 * away) - GAIN * basin * 0.26 + (speed(config) - 0.636) ** 2
+    return 0.26 * (1.0 + 0.05 * away) - GAIN * basin * 0.26 + (speed(case.config) - 0.636) ** 2
 
 
 @dataclass
 class MadeResolver:
     """Ends at once; a start decides the basin, and a leap leads from the first to the second."""
 
-    config: StudyConfig
+    case: Case
     fails: Fails = field(default=lambda config: False)
     leaps: bool = False
     errors: tuple[float, float] = (5e-4, 5e-3)
-    solved: list[StudyConfig] = field(default_factory=list)
+    solved: list[Case] = field(default_factory=list)
 
     @property
     def optimum(self) -> MadeOptimum:
-        return self.restored(self.config, self.end(self.config, 0.0, "converged"))
+        return self.restored(self.case, self.end(self.case, 0.0, "converged"))
 
-    def resolve(self, config: StudyConfig, start: MadeOptimum | None = None) -> MadeOptimum:
-        self.solved.append(config)
+    def resolve(self, case: Case, start: MadeOptimum | None = None) -> MadeOptimum:
+        self.solved.append(case)
         start = start or self.optimum
-        far = np.linalg.norm(np.log(start.stiffness / MadeOptimum(config, start.result).stiffness))
+        far = np.linalg.norm(np.log(start.stiffness / MadeOptimum(case, start.result).stiffness))
         basin = 1.0 if self.leaps and far > 3.0 else start.result.unknowns[0]
-        status = LIMIT if self.fails(config) else "converged"
-        return self.restored(config, self.end(config, basin, status))
+        status = LIMIT if self.fails(case.config) else "converged"
+        return self.restored(case, self.end(case, basin, status))
 
-    def restored(self, config: StudyConfig, result: NlpResult) -> MadeOptimum:
-        return MadeOptimum(config, result, self.errors)
+    def restored(self, case: Case, result: NlpResult) -> MadeOptimum:
+        return MadeOptimum(case, result, self.errors)
 
-    def end(self, config: StudyConfig, basin: float, status: str) -> NlpResult:
-        weight = config.cost.walking_speed_weight
-        cost = effort(config, basin) - weight * speed(config)
-        unknowns = np.array([basin, *0.01 * np.log(MadeOptimum(config, made_result()).stiffness)])
+    def end(self, case: Case, basin: float, status: str) -> NlpResult:
+        weight = case.config.cost.walking_speed_weight
+        cost = effort(case, basin) - weight * speed(case.config)
+        unknowns = np.array([basin, *0.01 * np.log(MadeOptimum(case, made_result()).stiffness)])
         return replace(made_result(), unknowns=unknowns, objective=cost, status=status)
 
 
@@ -114,7 +119,7 @@ def made_measures(optimum: MadeOptimum) -> dict[str, float]:
     """Return measures that follow the config."""
     return {
         "cost": optimum.cost,
-        "effort_per_distance": effort(optimum.config, optimum.result.unknowns[0]),
+        "effort_per_distance": effort(optimum.case, optimum.result.unknowns[0]),
         "min_stance_knee_flexion_left": 0.42,
         "min_stance_knee_flexion_right": 0.40 + 1e-3 * float(optimum.stiffness[0]),
         "step_length_left": 0.36,
@@ -125,8 +130,12 @@ def made_measures(optimum: MadeOptimum) -> dict[str, float]:
     }
 
 
-def made_run(folder: Path, config: StudyConfig | None = None) -> Run:
+def made_run(folder: Path, case: Case | None = None) -> Run:
     """Return a run to stand on."""
-    config = config or load_config("mapd-orthosis")
     motion = stylised_series("orthosis").motion
-    return Run(folder, {"motion_hash": "made", "input_hashes": {}}, motion, config)
+    return Run(
+        folder,
+        {"motion_hash": "made", "input_hashes": {}},
+        motion,
+        case or load_case("mapd-orthosis"),
+    )

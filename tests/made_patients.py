@@ -20,8 +20,8 @@ from pathwalker_cli.conventions import (
 )
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import gait_bounds
-from pathwalker_cli.gait.goals import Goals
-from pathwalker_cli.gait.problem import INTEGRALS, VELOCITIES, GaitProblem, GaitWeights
+from pathwalker_cli.gait.costs import Costs
+from pathwalker_cli.gait.problem import VELOCITIES, GaitProblem
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -37,9 +37,14 @@ LIMBS: Final = tuple(name for name in SegmentLengths.model_fields if name not in
 STRENGTHS: Final = tuple(
     f"{joint}_{action}" for joint in ("hip", "knee", "ankle") for action in ("extension", "flexion")
 )
-GOALS: Final = Goals(("crouch", "centre_of_pressure", "peak_activation"))
+GOALS: Final = Costs(("crouch", "centre_of_pressure", "peak_activation"))
 """Goals that treat both steps alike."""
-WEIGHTS: Final = GaitWeights(acceleration=0.1, goals=dict.fromkeys(GOALS.names, 1.0))
+WEIGHTS: Final = {
+    "effort": 1.0,
+    "rate": 1e-3,
+    "acceleration": 0.1,
+    **dict.fromkeys(GOALS.names, 1.0),
+}
 DEGREE, INTERVALS, FRICTION = 3, 2, 0.7
 
 
@@ -225,7 +230,7 @@ def random_step(seed: int) -> PhasedMotion:
     smooth, controls = rng.random((count + 1, m)), 5.0 * rng.normal(size=(count + 1, m))
     for values in (smooth, controls):
         values[-1] = values[0][mirror_permutation(GENERATORS)]
-    costs = (*INTEGRALS, *GOALS.integrals)
+    costs = GOALS.integrals
     integrals = np.cumsum(rng.random((count + 1, len(costs))), axis=0)
     phases = []
     for i, phase in enumerate(PHASES[:half]):

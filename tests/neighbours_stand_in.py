@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from conftest import made_result
-from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.case import Case
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.ipopt import NlpResult
-from pathwalker_cli.patient import load_patient
 
 BEST = dict(zip(STIFFNESSES, (92.0, 40.0, 6.0, 5.0), strict=True))
 """K_D right at its upper limit, K_P left at its lower one, the others inside."""
@@ -30,8 +30,12 @@ CURVATURE = 1e-4
 class StandInOptimum:
     """What a study asks of a neighbour."""
 
-    config: StudyConfig
+    case: Case
     result: NlpResult
+
+    @property
+    def config(self) -> StudyConfig:
+        return self.case.config
 
     @property
     def converged(self) -> bool:
@@ -39,7 +43,7 @@ class StandInOptimum:
 
     @property
     def solver(self) -> Any:
-        walker = build_walker(study_patient(self.config), "orthosis", backend="direct")
+        walker = build_walker(self.case.patient, "orthosis", backend="direct")
         return SimpleNamespace(walker=walker, bounds=gait_bounds(walker, self.config.bounds))
 
     @property
@@ -51,27 +55,27 @@ class StandInOptimum:
 class StandInResolver:
     """Ends every solve at once; those of which `fails` says so do not converge."""
 
-    config: StudyConfig
-    solved: list[StudyConfig] = field(default_factory=list)
+    case: Case
+    solved: list[Case] = field(default_factory=list)
     fails: Callable[[StudyConfig], bool] = field(default=lambda config: False)
 
     @property
     def optimum(self) -> StandInOptimum:
-        return StandInOptimum(self.config, made_result())
+        return StandInOptimum(self.case, made_result())
 
-    def resolve(self, config: StudyConfig, start: StandInOptimum | None = None) -> StandInOptimum:
-        self.solved.append(config)
-        status = "the iteration limit was reached" if self.fails(config) else "converged"
-        return StandInOptimum(config, replace(made_result(), status=status))
+    def resolve(self, case: Case, start: StandInOptimum | None = None) -> StandInOptimum:
+        self.solved.append(case)
+        status = "the iteration limit was reached" if self.fails(case.config) else "converged"
+        return StandInOptimum(case, replace(made_result(), status=status))
 
-    def restored(self, config: StudyConfig, result: NlpResult) -> StandInOptimum:
-        return StandInOptimum(config, result)
+    def restored(self, case: Case, result: NlpResult) -> StandInOptimum:
+        return StandInOptimum(case, result)
 
 
 def stand_in_measures(optimum: StandInOptimum) -> dict[str, float]:
     """Return measures that follow springs and strengths."""
     springs = chosen(optimum.config)
-    patient, usual = study_patient(optimum.config), load_patient(optimum.config.patient)
+    patient, usual = optimum.case.patient, optimum.case.unvaried
     strength = np.mean(np.array(patient.max_isometric_torque) / usual.max_isometric_torque)
     cost = 0.28 / strength
     for name, value in springs.items():

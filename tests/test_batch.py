@@ -22,18 +22,18 @@ from rich.console import Console
 
 from conftest import MadeSolution
 from fake_work import die, fake_work
+from pathwalker_cli.case import Case, load_case
 from pathwalker_cli.cli import cli
 from pathwalker_cli.commands.batch_progress import BatchProgress
-from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.results import run_folder
-from pathwalker_cli.results.metrics import run_inputs
-from pathwalker_cli.results.run_folder import config_text, write_run
+from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies.batch import ledger, local
-from pathwalker_cli.studies.batch.cases import Case, load_cases
+from pathwalker_cli.studies.batch.cases import BatchCase, load_cases
 from pathwalker_cli.studies.batch.local import LocalPool
 from pathwalker_cli.studies.batch.names import case_name, short_keys, slug
 from pathwalker_cli.studies.batch.study import Watch, run_batch
@@ -94,7 +94,7 @@ def test_the_shipped_study_is_patients_by_problems_by_grid() -> None:
         f"{PATIENT}--mapd-orthosis--strengths_0.8",
         f"{PATIENT}--mapd-orthosis--strengths_1",
     ]
-    weak = study_patient(batch.cases[0].config).max_isometric_torque
+    weak = batch.cases[0].study.patient.max_isometric_torque
     assert weak == pytest.approx(0.8 * np.array(load_patient(PATIENT).max_isometric_torque))
 
 
@@ -113,10 +113,11 @@ def test_grid_times_named_cases_in_order(here: Path) -> None:
         f"{stem}_0.2--hip_r_-1_0.5--plain",
         f"{stem}_0.2--hip_r_-1_0.5--rough",
     ]
-    assert [case.config.bounds.friction for case in cases] == [0.7, 0.9, 0.7, 0.9]
-    assert {case.config.mesh.refinements for case in cases} == {0}
-    assert {case.config.mesh.degree for case in cases} == {3}, "a block leaves the rest as it is"
-    assert cases[0].config.bounds.joint_ranges["hip_r"] == (-1.0, 0.5)
+    assert [case.study.config.bounds.friction for case in cases] == [0.7, 0.9, 0.7, 0.9]
+    assert {case.study.config.mesh.refinements for case in cases} == {0}
+    degrees = {case.study.config.mesh.degree for case in cases}
+    assert degrees == {3}, "a block leaves the rest as it is"
+    assert cases[0].study.config.bounds.joint_ranges["hip_r"] == (-1.0, 0.5)
 
 
 def test_places_in_the_patients_file_keep_their_dots(here: Path) -> None:
@@ -127,8 +128,8 @@ def test_places_in_the_patients_file_keep_their_dots(here: Path) -> None:
     )
     (case,) = load_cases(path).cases
     scale = {"strengths": 0.5, "strengths.knee_extension.right": 0.5}
-    assert case.config.variation.scale == scale
-    assert case.config.variation.shift == {"body_mass": 1.0}
+    assert case.study.config.variation.scale == scale
+    assert case.study.config.variation.shift == {"body_mass": 1.0}
 
 
 def test_patients_come_by_id_file_folder_and_pattern(here: Path) -> None:
@@ -139,8 +140,8 @@ def test_patients_come_by_id_file_folder_and_pattern(here: Path) -> None:
     listed = [PATIENT, "clinic/*.yaml", "carla", "others"]
     cases = load_cases(study_file(here, patients=listed)).cases
     assert [case.patient for case in cases] == [PATIENT, "anna", "berta", "carla", "dora"]
-    assert cases[1].config.patient == str(here / "clinic" / "anna.yaml")
-    assert study_patient(cases[4].config).id == "dora"
+    assert cases[1].study.config.patient == str(here / "clinic" / "anna.yaml")
+    assert cases[4].patient == "dora"
 
 
 def test_names_stay_when_patients_are_added_and_paths_do_not_depend_on_where_one_is(
@@ -153,7 +154,7 @@ def test_names_stay_when_patients_are_added_and_paths_do_not_depend_on_where_one
     monkeypatch.chdir("/")
     after = load_cases(path).cases
     assert [case.name for case in after[1:]] == [case.name for case in before]
-    assert after[1].config == before[0].config
+    assert after[1].study.config == before[0].study.config
 
 
 def test_problems_come_by_name_and_by_file(here: Path) -> None:
@@ -161,15 +162,15 @@ def test_problems_come_by_name_and_by_file(here: Path) -> None:
     (here / "calm.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     cases = load_cases(study_file(here, problems=["calm.yaml", "mapd-orthosis"])).cases
     assert [case.problem for case in cases] == ["calm", "mapd-orthosis"]
-    assert cases[0].config.cost.rate_weight == 0.5
-    assert cases[0].config.patient == PATIENT
+    assert cases[0].study.config.cost.rate_weight == 0.5
+    assert cases[0].study.config.patient == PATIENT
 
 
 def test_keys_of_the_study_are_overridden_by_dotted_keys(here: Path) -> None:
     path = study_file(here, grid={"cost.rate_weight": [0.1]})
     (case,) = load_cases(path, ("set.bounds.friction=0.5", "grid.cost.rate_weight=[0.3]")).cases
     assert case.name == f"{PATIENT}--mapd-barefoot--rate_weight_0.3"
-    assert case.config.bounds.friction == 0.5
+    assert case.study.config.bounds.friction == 0.5
     assert [case.patient for case in load_cases(path, (f"patients=[{HEALTHY}]",)).cases] == [
         HEALTHY
     ]
@@ -402,8 +403,9 @@ def test_headers_have_the_units_of_what_is_varied(key: str, unit: str) -> None:
 
 
 def test_a_row_leaves_out_the_gait_of_a_last_iterate() -> None:
-    config = StudyConfig(problem="mapd-barefoot", patient=PATIENT)
-    case = Case("a", "anna", "walk", config, {"bounds.friction": 0.7, "x": [1, 2]}, "calm")
+    anna = load_patient(PATIENT).model_copy(update={"id": "anna"})
+    study = Case(load_config("mapd-barefoot"), anna)
+    case = BatchCase("a", "walk", study, {"bounds.friction": 0.7, "x": [1, 2]}, "calm")
     table = CaseTable([case])
     assert ",".join(table.header) == (
         "case,patient,problem,bounds.friction [1],x,variant,status,cost,walking_speed [m/s],"
@@ -441,10 +443,10 @@ class Serial:
             if i == self.stop_after:
                 raise KeyboardInterrupt
             self.given.append(task.name)
-            yield task.name, self.work(task.config, task.folder, task.warm_start)
+            yield task.name, self.work(task.case, task.folder, task.warm_start)
 
 
-def kinds(folder: Path, *wanted: str) -> tuple[Case, ...]:
+def kinds(folder: Path, *wanted: str) -> tuple[BatchCase, ...]:
     """Return cases that go as their names say."""
     cases = [
         {"name": kind, "set": {"bounds.friction": round(0.5 + 0.01 * i, 2)}}
@@ -487,7 +489,8 @@ def test_workers_that_cannot_begin_fail_every_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(local, "prepare_worker", die)
-    tasks = [Task(str(i), "x" * 20000, str(tmp_path)) for i in range(9)]
+    case = load_case("mapd-barefoot")
+    tasks = [Task(str(i), case, str(tmp_path)) for i in range(9)]
     results = dict(LocalPool(4).run(tasks, fake_work))
     assert {result["reason"] for result in results.values()} == {LOST}
     assert {result["detail"] for result in results.values()} == {local.NO_WORKERS}
@@ -497,12 +500,11 @@ def test_workers_that_cannot_begin_fail_every_case(
 def made(made_solution: MadeSolution) -> Work:
     """Return work that writes a run which is not the fruit of a solve."""
 
-    def work(config: str, folder: str, warm_start: str) -> Ending:
-        study = StudyConfig.model_validate_json(config, strict=True)
+    def work(case: Case, folder: str, warm_start: str) -> Ending:
         bad = "fails" in folder and not Path(folder).exists()
         status = "the iterates diverged" if bad else "converged"
-        solution = made_solution(study.problem, config=study, status=status)
-        write_run(folder, solution, (), run_inputs(config_text(study), study_patient(study)))
+        solution = made_solution(case.config.problem, case=case, status=status)
+        write_run(folder, solution)
         return Ending(wrote=True, reason="", detail="", seconds=1.0, worker="me")
 
     return work
@@ -551,7 +553,7 @@ def test_a_case_that_is_solved_already_is_not_solved_again_by_a_worker(
     tmp_path: Path, made_solution: MadeSolution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (case,) = kinds(tmp_path, "done")
-    words = (case.config.model_dump_json(), str(tmp_path / "run"), "")
+    words = (case.study, str(tmp_path / "run"), "")
     made(made_solution)(*words)
     monkeypatch.setattr("pathwalker_cli.studies.run.run_study", lambda *_: 1 / 0)
     assert solve_case(*words)["wrote"]
@@ -598,12 +600,11 @@ def test_the_example_of_the_documentation_is_accepted(
 def test_a_worker_says_why_there_is_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken" / "thesis.txt").touch()
-    config = StudyConfig(problem="mapd-barefoot", patient=PATIENT).model_dump_json()
-    result = solve_case(config, str(tmp_path / "taken"), "")
+    result = solve_case(load_case("mapd-barefoot"), str(tmp_path / "taken"), "")
     assert not result["wrote"]
     assert "thesis.txt" in result["reason"]
     monkeypatch.setattr("pathwalker_cli.studies.run.check_target", lambda _: 1 / 0)
-    result = solve_case(config, str(tmp_path / "new"), "")
+    result = solve_case(load_case("mapd-barefoot"), str(tmp_path / "new"), "")
     assert result["reason"] == "ZeroDivisionError: division by zero"
     assert "Traceback" in result["detail"]
 
@@ -643,12 +644,14 @@ import signal
 import sys
 from pathlib import Path
 from fake_work import die, fake_work
+from pathwalker_cli.case import load_case
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.studies.batch.local import LocalPool
 from pathwalker_cli.studies.batch.worker import Task
 
 def work():
-    tasks = [Task(n, "{}", sys.argv[1] + "/cases/" + n) for n in ("a--hangs", "b--hangs")]
+    case = load_case("mapd-barefoot")
+    tasks = [Task(n, case, sys.argv[1] + "/cases/" + n) for n in ("a--hangs", "b--hangs")]
     for _ in LocalPool(2).run(tasks, fake_work): pass
 
 if __name__ == "__main__":
@@ -665,7 +668,8 @@ if __name__ == "__main__":
 def test_workers_end_with_their_parent(tmp_path: Path, number: signal.Signals) -> None:
     script = tmp_path / "hanging.py"
     script.write_text(HANGING, encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    places = [str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(places)}
     command = [sys.executable, script, tmp_path]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment,
                           start_new_session=True) as parent:  # fmt: skip
@@ -733,11 +737,11 @@ def test_the_command_reports_and_exits_with_0_or_1(here: Path) -> None:
 def test_a_terminal_gets_a_bar() -> None:
     screen = StringIO()
     console = Console(file=screen, force_terminal=True, width=100)
-    config = StudyConfig(problem="mapd-barefoot", patient=PATIENT)
+    study = load_case("mapd-barefoot")
     with BatchProgress(console=console) as progress:
         progress.begin(4, 1, 2)
         for name, status in (("a", "converged"), ("b", "failed: a bug")):
-            progress.ended(ledger.Ended(Case(name, "p", "q", config), status, None, 3.0))
+            progress.ended(ledger.Ended(BatchCase(name, "q", study), status, None, 3.0))
     shown = screen.getvalue()
     assert "1 of 4" in shown
     assert "b: failed: a bug, 3.0 s" in shown

@@ -17,6 +17,7 @@ import pytest
 from distributed import Client, LocalCluster
 
 from fake_work import fake_work
+from pathwalker_cli.case import load_case
 from pathwalker_cli.errors import BackendError, ConfigError
 from pathwalker_cli.studies.batch import cluster as module
 from pathwalker_cli.studies.batch.cluster import DaskPool, connected, slurm_jobs
@@ -53,10 +54,8 @@ def test_the_table_is_that_of_local_workers_though_one_is_killed(
 def test_what_has_not_begun_is_taken_back_when_the_caller_stops(
     tmp_path: Path, cluster: LocalCluster
 ) -> None:
-    tasks = [
-        Task(str(i), '{"bounds": {"friction": 0.5}}', str(tmp_path / "cases" / str(i)))
-        for i in range(30)
-    ]
+    case = load_case("mapd-barefoot")
+    tasks = [Task(str(i), case, str(tmp_path / "cases" / str(i))) for i in range(30)]
     with Client(cluster.scheduler_address) as client:
         results = DaskPool(client).run(tasks, fake_work)
         next(results)

@@ -227,7 +227,7 @@ def test_bad_input_gets_one_sentence(
 
 
 def test_twenty_runs_look_different_and_one_alone_looks_like_its_sides(runs: Path) -> None:
-    (gait,) = gaits_of_runs([runs / "mapd-barefoot"])
+    ((_, gait),) = gaits_of_runs([runs / "mapd-barefoot"])
     shown = traces([gait] * 20, [str(i) for i in range(20)])
     assert len({str(trace.look("right")) for trace in shown}) == 20
     assert all(trace.look("right") == trace.look("left") for trace in shown)
@@ -237,7 +237,7 @@ def test_twenty_runs_look_different_and_one_alone_looks_like_its_sides(runs: Pat
 
 
 def test_labels_are_never_formulas_nor_hidden(runs: Path) -> None:
-    (gait,) = gaits_of_runs([runs / "mapd-barefoot"])
+    ((_, gait),) = gaits_of_runs([runs / "mapd-barefoot"])
     labels = [trace.label for trace in traces([gait] * 3, ["$a$", "_b", "c\n\x00"])]
     assert labels == [r"\$a\$", " _b", "c??"]
 

@@ -19,7 +19,7 @@ from pathwalker_cli.cli import COMMANDS
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.gait.goals import GOALS
+from pathwalker_cli.gait.costs import GOALS
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.io.yaml_file import read_mapping, validate
 from pathwalker_cli.model.contact import PHASES
@@ -116,7 +116,7 @@ def test_run_folder_names_every_key_of_the_metrics(made_solution: MadeSolution) 
     groups = (page.OUTCOME, page.gait_keys(), page.PROOF, page.ORIGIN)
     told = {key for group in groups for name in group for key in page.expanded(name)}
     for problem in PROBLEMS:
-        written = set(run_metrics(made_solution(problem), RunInputs({}, "")).content())
+        written = set(run_metrics(made_solution(problem), RunInputs({})).content())
         assert told == written | {"verdict", "motion_hash", "multipliers_hash", "metrics_hash"}
 
 

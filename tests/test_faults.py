@@ -105,7 +105,7 @@ def test_a_write_of_a_run_killed_at_any_step_leaves_the_old_run_or_the_new_one(
 ) -> None:
     run, seen = tmp_path / "runs" / "run", set()
     solution = made_solution(cost=0.9)
-    metrics = run_folder.run_metrics(solution, run_inputs("", solution.walker.patient))
+    metrics = run_folder.run_metrics(solution, run_inputs(solution.case))
     monkeypatch.setattr(run_folder, "run_metrics", lambda made, _: {**metrics, "cost": made.cost})
     monkeypatch.setattr(run_folder, "TABLES", dict.fromkeys(run_folder.TABLES, small_table))
     if exchange == "in two steps":
@@ -347,7 +347,7 @@ def test_an_error_of_the_disk_is_told_with_its_place_and_what_to_do(
         with atomic_open(tmp_path / "points.npz"):
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("pathwalker_cli.commands.solve._study", fail)
+    monkeypatch.setattr("pathwalker_cli.commands.solve._case", fail)
     result = CliRunner().invoke(cli, ["solve", "mapd-healthy", "mapd-healthy"])
     expected = f"Error: {tmp_path}/points.npz: No space left on device; make room, then call again"
     assert result.output.strip() == expected

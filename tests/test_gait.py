@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from pathwalker_cli.case import Case
 from pathwalker_cli.config import BoundsConfig, StudyConfig, load_config
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import DataError, NotConvergedError
@@ -33,7 +34,7 @@ def _config(**changes: object) -> StudyConfig:
 
 @pytest.fixture(scope="module")
 def solver() -> GaitSolver:
-    return GaitSolver(_config())
+    return GaitSolver(Case.of(_config()))
 
 
 @pytest.fixture(scope="module")
@@ -160,7 +161,7 @@ def test_a_recorded_start_without_recordings_is_refused() -> None:
     config = _config(patient=CHILD)
     start = config.start.model_copy(update={"gait": "recorded"})
     with pytest.raises(DataError, match="no barefoot recording of a whole stride"):
-        GaitSolver(config.model_copy(update={"start": start}))
+        GaitSolver(Case.of(config.model_copy(update={"start": start})))
 
 
 def test_mesh_follows_durations_and_errors() -> None:

@@ -12,15 +12,15 @@ from helpers import stylised_series
 from pathwalker_cli.config import load_config, smoke_version, with_values
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.gait.goal_costs import goal_values, with_goal_costs
-from pathwalker_cli.gait.goals import COMFORT_COORDINATES, GOALS, Goals
+from pathwalker_cli.gait.cost_terms import goal_values, with_goal_costs
+from pathwalker_cli.gait.costs import COMFORT_COORDINATES, GOALS, Costs, Instant, Totals
 from pathwalker_cli.gait.solve import solve_study
 from pathwalker_cli.model.contact import PHASES, phase_named
 from pathwalker_cli.ocp.phased import PhasedMotion
 
 WEIGHT = 262.0
 RANGES = {"knee_r": (0.3, 0.5), "lumbar": (0.0, 0.1)}
-EVERY = Goals(tuple(GOALS), comfort_ranges=RANGES)
+EVERY = Costs(tuple(GOALS), comfort_ranges=RANGES)
 N = len(COORDINATES)
 
 
@@ -77,10 +77,9 @@ def test_values_are_those_of_the_formulas() -> None:
 
 def test_running_costs_of_a_start_add_up_to_the_values() -> None:
     motion = with_goal_costs(stylised_series("barefoot").motion, EVERY, WEIGHT)
-    totals = motion.phases[-1].integrals[-1][-len(EVERY.integrals) :]
-    costs = dict(zip(EVERY.integrals, totals, strict=True))
+    costs = dict(zip(EVERY.integrals, motion.phases[-1].integrals[-1], strict=True))
     distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
-    values = EVERY.values(costs, distance, motion.duration, list(motion.durations))
+    values = EVERY.goal_values(Totals(costs, distance, motion.duration, list(motion.durations)))
     assert values == pytest.approx(goal_values(motion, WEIGHT, RANGES))
     for before, after in zip(motion.phases, motion.phases[1:], strict=False):
         assert np.allclose(before.integrals[-1], after.integrals[0])
@@ -89,18 +88,19 @@ def test_running_costs_of_a_start_add_up_to_the_values() -> None:
 @pytest.mark.parametrize("name", GOALS)
 @pytest.mark.parametrize("phase", [PHASES[0], PHASES[3], PHASES[6]], ids=lambda phase: phase.name)
 def test_derivatives_of_running_costs_are_those_of_differences(name: str, phase: Any) -> None:
-    goals, rng = Goals((name,), comfort_ranges=RANGES), np.random.default_rng(4)
+    goals, rng = Costs((name,), comfort_ranges=RANGES), np.random.default_rng(4)
     sizes = [N, N, len(GENERATORS), len(phase.forces)]
     point = np.concatenate([rng.uniform(0.1, 0.9, sum(sizes[:3])), 100 * rng.random(sizes[3])])
     numbers = list(goals.numbers(WEIGHT))
 
     def costs(x: np.ndarray) -> np.ndarray:
         parts = [list(part) for part in np.split(x, np.cumsum(sizes)[:-1])]
-        return np.array(goals.integrands(phase, *parts, numbers), dtype=float)
+        point = Instant(phase, *parts)
+        return np.array(goals.integrands(point, numbers, goals.goals), dtype=float)
 
     x = ca.SX.sym("x", sum(sizes))
     parts = [ca.vertsplit(part) for part in ca.vertsplit(x, [0, *np.cumsum(sizes).tolist()])]
-    symbols = ca.vertcat(*goals.integrands(phase, *parts, numbers))
+    symbols = ca.vertcat(*goals.integrands(Instant(phase, *parts), numbers, goals.goals))
     jacobian = np.asarray(ca.Function("j", [x], [ca.jacobian(symbols, x)])(point))
     assert np.asarray(ca.Function("c", [x], [symbols])(point)).ravel() == pytest.approx(
         costs(point)
@@ -112,15 +112,15 @@ def test_derivatives_of_running_costs_are_those_of_differences(name: str, phase:
 
 @pytest.mark.parametrize("name", GOALS)
 def test_derivatives_of_values_are_those_of_differences(name: str) -> None:
-    goals, rng = Goals((name,)), np.random.default_rng(5)
-    count = len(goals.integrals)
+    goals, rng = Costs((name,)), np.random.default_rng(5)
+    names = GOALS[name].integrals
+    count = len(names)
     point = rng.uniform(0.1, 0.6, count + 10)
 
     def value(x: Any) -> Any:
-        costs = {integral: x[i] for i, integral in enumerate(goals.integrals)}
-        return goals.values(costs, x[count], x[count + 1], [x[count + 2 + i] for i in range(8)])[
-            name
-        ]
+        costs = {integral: x[i] for i, integral in enumerate(names)}
+        durations = [x[count + 2 + i] for i in range(8)]
+        return goals.goal_values(Totals(costs, x[count], x[count + 1], durations))[name]
 
     x = ca.SX.sym("x", len(point))
     gradient = np.asarray(ca.Function("g", [x], [ca.gradient(value(x), x)])(point)).ravel()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from pathwalker_cli.case import Case
 from pathwalker_cli.config import load_config, smoke_version, with_values
 from pathwalker_cli.gait.neighbourhood import Neighbourhood
 from pathwalker_cli.gait.resolve import Resolver, warm_start_for
@@ -115,9 +116,9 @@ def test_a_warm_start_goes_further_off_its_bounds_the_more_it_misses() -> None:
 @pytest.mark.slow
 def test_derivatives_of_a_gait_agree_with_solves() -> None:
     config = smoke_version(load_config("mapd-orthosis"))
-    config = with_values(config, {"solver.tolerance": 1e-6})
-    solution = GaitSolver(config).solve()
-    resolver = Resolver(config, solution.last_motion, solution.nlp.multipliers, 1e-9)
+    case = Case.of(with_values(config, {"solver.tolerance": 1e-6}))
+    solution = GaitSolver(case).solve()
+    resolver = Resolver(case, solution.last_motion, solution.nlp.multipliers, 1e-9)
     around = Neighbourhood(resolver)
     step, compared = 5e-4, 0
     for name, found, change in (
@@ -125,7 +126,7 @@ def test_derivatives_of_a_gait_agree_with_solves() -> None:
         ("strength", around.by_factor("strengths"), "strengths"),
     ):
         ends = [
-            resolver.resolve(with_values(config, {"variation.scale": {change: 1.0 + sign * step}}))
+            resolver.resolve(case.with_values({"variation.scale": {change: 1.0 + sign * step}}))
             for sign in (-1.0, 1.0)
         ]
         if any(around.changed_activity(end) for end in ends):

@@ -15,9 +15,9 @@ import pytest
 from click.testing import CliRunner
 
 from made_neighbours import LIMIT, Fails, MadeResolver, made_measures, made_run
+from pathwalker_cli.case import load_case
 from pathwalker_cli.cli import cli
 from pathwalker_cli.commands import landscape as command
-from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.results.run_folder import write_run
@@ -47,7 +47,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
         leaps: bool = False,
         errors: tuple[float, float] = (5e-4, 5e-3),
     ) -> tuple[Landscape, MadeResolver]:
-        resolver = MadeResolver(load_config("mapd-orthosis"), leaps=leaps, errors=errors)
+        resolver = MadeResolver(load_case("mapd-orthosis"), leaps=leaps, errors=errors)
         resolver.fails = fails or resolver.fails
         monkeypatch.setattr(neighbours, "resolver_of", lambda run: resolver)
         study = load_study("landscape", LandscapeStudy, changes)
@@ -113,9 +113,9 @@ def test_the_grid_joins_the_optimum_to_the_corners_of_its_cell() -> None:
 
 @pytest.mark.parametrize("side", ["right", "left", "both"])
 def test_springs_of_a_side_are_prescribed_and_others_stay(side: str) -> None:
-    base = load_config("mapd-orthosis")
+    base = load_case("mapd-orthosis")
     sides = LandscapeStudy(base="", side=side).sides
-    given = with_springs(base, sides, (40.0, 10.0)).bounds.stiffness
+    given = with_springs(base, sides, (40.0, 10.0)).config.bounds.stiffness
     assert given == {
         f"{kind}_stiffness_{s}": (k, k)
         for kind, k in (("dorsiflexion", 40.0), ("plantarflexion", 10.0)) for s in sides
@@ -181,7 +181,7 @@ def test_points_that_fail_stay_blank(made: Make) -> None:
 
 def test_tied_sides_have_no_optimum_to_compare_with(made: Make) -> None:
     landscape, resolver = made((*COARSE, "side=both"))
-    springs = resolver.solved[-1].bounds.stiffness
+    springs = resolver.solved[-1].config.bounds.stiffness
     assert springs["dorsiflexion_stiffness_right"] == springs["dorsiflexion_stiffness_left"]
     text = "\n".join(landscape_lines(landscape))
     assert "both sides" in text
@@ -218,7 +218,7 @@ def test_tied_springs_need_a_solution_to_begin_with(made: Make) -> None:
 
 
 def test_barefoot_has_no_landscape(tmp_path: Path) -> None:
-    run = made_run(tmp_path, load_config("mapd-barefoot"))
+    run = made_run(tmp_path, load_case("mapd-barefoot"))
     with pytest.raises(ConfigError, match="springs"):
         landscape_of(LandscapeStudy(base=""), run, tmp_path, lambda line: None)
 
@@ -328,8 +328,8 @@ def test_a_foreign_folder_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_real_landscape(tmp_path: Path) -> None:
-    config = load_config("mapd-orthosis", changes=("mesh.intervals=24", "mesh.refinements=0"))
-    write_run(tmp_path / "run", GaitSolver(config).solve())
+    case = load_case("mapd-orthosis", changes=("mesh.intervals=24", "mesh.refinements=0"))
+    write_run(tmp_path / "run", GaitSolver(case).solve())
     words = ("--set", "dorsiflexion.points=3", "--set", "plantarflexion.points=3")
     done = run("landscape", "--run", tmp_path / "run", "--out", tmp_path / "out", *words)
     assert done.exit_code == 0, done.output

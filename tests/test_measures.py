@@ -26,7 +26,7 @@ from pathwalker_cli.stride import measures as registry
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import REGISTRY, TABLES, expanded, measures_in, metrics_of
 from pathwalker_cli.stride.stride import NotKnownError, stride_of
-from pathwalker_cli.studies.batch.cases import Case
+from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.table import CaseTable
 from pathwalker_cli.studies.landscape.files import write_landscape
 from pathwalker_cli.studies.measures import all_measures, measures
@@ -82,7 +82,7 @@ def test_a_new_measure_stands_in_every_table_of_runs(runs: list[Path], tmp_path:
     assert [*json.loads(found.stdout)["metrics"][KEY]["values"].values()] == values
     section = gait_section(read_runs(runs), ())
     assert "Froude number" in [row.cells[0] for row in section.tables[0].rows]
-    case = cast(Case, SimpleNamespace(name="c", patient="p", problem="m", values={}, variant=""))
+    case = cast(BatchCase, SimpleNamespace(name="c", patient="p", problem="m", values={}, variant=""))
     table = CaseTable([case])
     cells = table.row(case, "converged", metrics_in(runs[0]))
     assert dict(zip(table.header, cells, strict=True))[KEY] == f"{values[0]:.9g}"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from made_patients import mirror_image
-from pathwalker_cli.config import StudyConfig, load_config, smoke_version, with_values
+from pathwalker_cli.case import Case
+from pathwalker_cli.config import load_config, smoke_version, with_values
 from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, mirror_permutation, mirrored
 from pathwalker_cli.gait.problem import ACCELERATIONS, ACTIVATIONS, RATES, RESERVES, VELOCITIES
 from pathwalker_cli.gait.solve import GaitSolver
@@ -59,12 +58,10 @@ def turned(phase: PhaseMotion, i: int, shift: float, costs: np.ndarray) -> Phase
     )
 
 
-def study_of(patient: Patient, folder: Path) -> StudyConfig:
+def case_of(patient: Patient) -> Case:
     """Return a quick barefoot prediction of a patient."""
-    content = patient.model_dump(mode="json", exclude_none=True)
-    (folder / "patient.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     config = smoke_version(load_config("mapd-barefoot"))
-    return with_values(config, {"patient": str(folder / "patient.yaml"), "solver.tolerance": 1e-6})
+    return Case(with_values(config, {"solver.tolerance": 1e-6}), patient)
 
 
 def cost_of(solver: GaitSolver, motion: PhasedMotion) -> float:
@@ -73,10 +70,10 @@ def cost_of(solver: GaitSolver, motion: PhasedMotion) -> float:
     return float(program.functions["nlp"](program.to_unknowns(motion), program.parameters)[0])
 
 
-def test_the_solution_of_the_mirror_image_is_mirrored(tmp_path: Path) -> None:
+def test_the_solution_of_the_mirror_image_is_mirrored() -> None:
     """The shipped patient is not symmetric; a mirrored optimum is one, at the same cost."""
     child = load_patient("sreenivasa2017-patient")
-    solver = GaitSolver(study_of(child, tmp_path))
+    solver = GaitSolver(case_of(child))
     found = solver.solve()
     assert found.status == "converged"
     stride = found.last_motion
@@ -84,7 +81,7 @@ def test_the_solution_of_the_mirror_image_is_mirrored(tmp_path: Path) -> None:
     again = image_of(image)
     for one, two in zip(stride.phases, again.phases, strict=True):
         assert one.states == pytest.approx(two.states, abs=1e-12)
-    other = GaitSolver(study_of(mirror_image(child), tmp_path))
+    other = GaitSolver(case_of(mirror_image(child)))
     assert cost_of(other, image) == pytest.approx(cost_of(solver, stride), rel=1e-13)
     solved = other.solve(image)
     assert solved.status == "converged"

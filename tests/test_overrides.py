@@ -46,7 +46,7 @@ def test_other_paths_of_overrides_count_from_here_too(here: Path) -> None:
     study = load_study("landscape", LandscapeStudy, ("base=mine.yaml",))
     assert study.base == str(here / "mine.yaml")
     (case,) = load_cases("cohort", ("patients=[anna/]", "problems=[mine.yaml]", "grid={}")).cases
-    assert case.config.patient == str(here / "anna" / "patient.yaml")
+    assert case.study.config.patient == str(here / "anna" / "patient.yaml")
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def test_shipped_patient_is_read() -> None:
     patient = load_patient("sreenivasa2017-patient")
     assert patient.source is not None
     assert patient.source.name == "patient.yaml"
-    assert patient.folder == patient.source.parent
+    assert patient.recordings == (patient.source.parent / "recordings",)
     assert (patient.age, patient.regression_age) == (7.0, 6.0)
     assert patient.length("thigh", "left") == 0.2607
     assert patient.length("hand", "right") == patient.length("hand", "left") == 0.09328

@@ -17,8 +17,8 @@ from click.testing import CliRunner, Result
 from conftest import made_result
 from made_neighbours import made_run
 from neighbours_stand_in import BEST, StandInOptimum, StandInResolver, stand_in_measures
+from pathwalker_cli.case import load_case
 from pathwalker_cli.cli import cli
-from pathwalker_cli.config import load_config, with_values
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
@@ -50,7 +50,7 @@ def runs(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) 
 @pytest.fixture
 def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
     """Let a stand-in solve all neighbours."""
-    stand_in = StandInResolver(load_config("mapd-orthosis"))
+    stand_in = StandInResolver(load_case("mapd-orthosis"))
     monkeypatch.setattr(module, "resolver_of", lambda run, tolerance: stand_in)
     monkeypatch.setattr(module, "measures", stand_in_measures)
     return stand_in
@@ -96,7 +96,7 @@ def test_every_free_spring_is_moved_and_stands_beside_the_article(
     cost = float(inside["cost [1]"]) / float(rows[0]["cost [1]"]) - 1.0
     assert float(inside["change of cost [%]"]) == pytest.approx(100.0 * cost, rel=1e-5)
     assert len(resolver.solved) == 4
-    assert all(config.solver.tolerance == 1e-8 for config in resolver.solved)
+    assert all(case.config.solver.tolerance == 1e-8 for case in resolver.solved)
     for extension in ("png", "svg"):
         assert (tmp_path / "out" / "figures" / f"perturbation.{extension}").stat().st_size > 1000
 
@@ -171,7 +171,7 @@ def test_further_factors_start_from_nearer_ones(
     monkeypatch.setattr(
         resolver,
         "resolve",
-        lambda config, start: (starts.append(start.config), solve(config, start))[1],
+        lambda case, start: (starts.append(start.config), solve(case, start))[1],
     )
     study = PerturbationStudy(
         base="x", factors=(0.8, 1.2, 0.9), springs=("dorsiflexion_stiffness_left",)
@@ -248,7 +248,7 @@ def test_a_prescribed_spring_has_no_optimum(
     call: Callable[..., Result], resolver: StandInResolver
 ) -> None:
     held = {"dorsiflexion_stiffness_left": (40.0, 40.0)}
-    resolver.config = with_values(resolver.config, {"bounds.stiffness": held})
+    resolver.case = resolver.case.with_values({"bounds.stiffness": held})
     output = call().output
     assert "K_D left" not in output
     result = call("--set", "springs=[dorsiflexion_stiffness_left]")
@@ -269,7 +269,7 @@ def test_a_folder_with_something_else_is_refused(
 def test_an_optimum_that_cannot_be_solved_again_is_refused(tmp_path: Path) -> None:
     run = made_run(tmp_path)
     failed = replace(made_result(), status="the iteration limit was reached")
-    resolver: Any = SimpleNamespace(optimum=StandInOptimum(run.config, failed))
+    resolver: Any = SimpleNamespace(optimum=StandInOptimum(run.case, failed))
     with pytest.raises(NotConvergedError, match="a tolerance of 1e-08: the iteration limit"):
         require_optimum(resolver, run, 1e-8)
 
@@ -283,17 +283,16 @@ def test_what_was_solved_before_needs_no_optimum(tmp_path: Path) -> None:
             raise AssertionError("the optimum is solved")
 
     for solved in (1, 0):
-        resolver: Any = Unasked(run.config)
+        resolver: Any = Unasked(run.case)
         journal = Journal(tmp_path / "points", run, resolver)
-        assert journal.resolve("softer", run.config).converged
+        assert journal.resolve("softer", run.case).converged
         assert (journal.solved, len(resolver.solved)) == (solved, solved)
 
 
 @pytest.mark.slow
 def test_real_neighbours_of_a_coarse_optimum(tmp_path: Path) -> None:
     coarse = {"mesh.intervals": 16, "mesh.refinements": 0, "solver.first_tolerance": 1e-6}
-    config = with_values(load_config("mapd-orthosis"), coarse)
-    run = base_run(config, tmp_path / "base")
+    run = base_run(load_case("mapd-orthosis").with_values(coarse), tmp_path / "base")
     result = perturb(PerturbationStudy(base="x"), run, tmp_path)
     assert not result.failed
     assert "\n".join(perturbation_lines(result))

@@ -9,6 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from pathwalker_cli import build_walker, load_patient
+from pathwalker_cli.case import Case, load_case
 from pathwalker_cli.config import StudyConfig, load_config, smoke_version
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, mirror_permutation, mirrored
 from pathwalker_cli.errors import ConfigError, DataError
@@ -50,9 +51,9 @@ def test_a_fit_needs_a_whole_recording() -> None:
 def test_half_a_cycle_needs_equal_sides() -> None:
     assert asymmetries(build_walker(load_patient(HEALTHY))) == []
     assert "strengths" in asymmetries(build_walker(load_patient(PATIENT)))
-    config = load_config("mapd-barefoot", changes=("half_cycle=true",))
+    case = load_case("mapd-barefoot", changes=("half_cycle=true",))
     with pytest.raises(ConfigError, match="half a cycle, but strengths"):
-        GaitSolver(config)
+        GaitSolver(case)
 
 
 def test_mirroring_twice_changes_nothing() -> None:
@@ -100,7 +101,7 @@ def test_a_coarse_fit_stays_near_the_recording() -> None:
     assert sum(terms.values()) == pytest.approx(solution.cost, rel=1e-6)
     assert terms["fit"] < 3.0
     assert [p.duration for p in solution.last_motion.phases] == pytest.approx(
-        GaitSolver(load_config("ls-barefoot")).stride.durations.tolist()
+        GaitSolver(load_case("ls-barefoot")).stride.durations.tolist()
     )
 
 
@@ -122,9 +123,9 @@ def test_one_step_gives_a_whole_symmetric_stride() -> None:
 
 def test_starts_are_spread_and_repeatable() -> None:
     config = smoke_version(load_config("mapd-orthosis", changes=("starts=4", "start.seed=7")))
-    solver = GaitSolver(config)
-    studies = spread_starts(config, solver)
-    assert studies == spread_starts(config, solver)
+    solver = GaitSolver(Case.of(config))
+    studies = [case.config for case in spread_starts(solver)]
+    assert studies == [case.config for case in spread_starts(solver)]
     assert studies[0].start == config.start
     assert all(study.starts == 1 for study in studies)
     lower, upper = solver.bounds.table.find("dorsiflexion_stiffness_left") or (0.0, 0.0)
@@ -133,21 +134,21 @@ def test_starts_are_spread_and_repeatable() -> None:
     ]
     assert all(lower <= value <= upper for value in springs)
     assert len({round(study.start.knee_flexion, 6) for study in studies}) == len(studies)
-    other = config.model_copy(update={"start": config.start.model_copy(update={"seed": 8})})
-    assert spread_starts(other, solver)[1] != studies[1]
+    solver.case = solver.case.with_values({"start.seed": 8})
+    assert spread_starts(solver)[1].config != studies[1]
 
 
 def test_shooting_solves_predictions_only() -> None:
-    config = load_config("ls-barefoot", changes=("transcription=multiple-shooting",))
+    case = load_case("ls-barefoot", changes=("transcription=multiple-shooting",))
     with pytest.raises(ConfigError, match="fits a recording"):
-        solve_by_shooting(GaitSolver(config))
+        solve_by_shooting(GaitSolver(case))
 
 
 @pytest.mark.slow
 def test_the_best_of_several_starts_is_the_result() -> None:
     config = smoke_version(load_config("mapd-barefoot", changes=("starts=3",)))
     found: list[int] = []
-    solution = solve_from_starts(config, lambda optimum: found.append(optimum.start))
+    solution = solve_from_starts(Case.of(config), lambda optimum: found.append(optimum.start))
     assert sorted(found) == [0, 1, 2]
     costs = [optimum.cost for optimum in solution.optima if optimum.converged]
     assert costs == sorted(costs)

@@ -34,6 +34,7 @@ from made_patients import (
     rows_of,
     similar,
 )
+from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import (
     COORDINATES,
@@ -48,7 +49,7 @@ from pathwalker_cli.conventions import (
 from pathwalker_cli.errors import ConfigError, PatientError
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.goals import Goals
+from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.symmetry import asymmetries, full_stride
 from pathwalker_cli.inverse.recorded_files import write_strengths_yaml
@@ -71,9 +72,7 @@ from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.blocks import OrthosisData
-from pathwalker_cli.results.metrics import run_inputs
 from pathwalker_cli.results.motion_file import read_motion, write_motion
-from pathwalker_cli.results.run_folder import config_text
 from pathwalker_cli.results.text import angle_words, summary_rows
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import gait_series
@@ -188,8 +187,8 @@ def test_rows_of_a_mirrored_motion_are_mirrored(patient: Patient, seed: int) -> 
     assert ends == pytest.approx(np.zeros(2 * len(COORDINATES) - 1 + 2 * len(GENERATORS)), abs=1e-9)
 
     gait, image_gait = (GaitProblem(w, "stride", GOALS) for w in (walker, image))
-    terms = cost_terms(stride, gait, WEIGHTS)
-    assert terms == pytest.approx(cost_terms(stride, image_gait, WEIGHTS), rel=1e-12)
+    terms = cost_terms(stride, gait.costs, WEIGHTS)
+    assert terms == pytest.approx(cost_terms(stride, image_gait.costs, WEIGHTS), rel=1e-12)
     series = gait_series(walker, stride)
     image_series = gait_series(image, replace(stride, parameters=swapped))
     half = len(series.time) // 2  # the first instant comes before both steps
@@ -316,7 +315,7 @@ def test_a_patient_comes_back_from_its_file(patient: Patient, worn: dict[str, An
     orthosis = accepted(worn)
     whole = patient.model_copy(update={"orthosis": orthosis})
     file = folder() / "patient.yaml"
-    file.write_text(run_inputs("", whole).patient, encoding="utf-8")
+    file.write_text(Case(load_config("mapd-orthosis"), whole).patient_text, encoding="utf-8")
     assert load_patient(file).model_dump() == whole.model_dump()
     (folder() / "hinge.yaml").write_text(
         yaml_text(orthosis.model_dump(mode="json", exclude_none=True), "A hinge."), encoding="utf-8"
@@ -669,7 +668,7 @@ def test_activation_rises_with_excitation(a: float, e: list[float]) -> None:
 def test_discomfort_is_smooth_and_grows_outside_the_range(
     edge: float, width: float, beyond: float
 ) -> None:
-    goals = Goals(("discomfort",), comfort_ranges={"knee_r": (edge - width, edge)})
+    goals = Costs(("discomfort",), comfort_ranges={"knee_r": (edge - width, edge)})
 
     def cost(angle: Any) -> Any:
         q = [0.0] * len(COORDINATES)

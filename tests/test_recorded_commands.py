@@ -267,8 +267,9 @@ BROKEN_TABLES: dict[str, tuple[str, Callable[[list[str]], list[str]], str]] = {
 @pytest.mark.parametrize("fault", BROKEN_TABLES)
 def test_broken_recordings_of_a_patient_are_refused(fault: str, tmp_path: Path) -> None:
     kind, broken, words = BROKEN_TABLES[fault]
-    shipped = load_patient(PATIENT).folder
-    assert shipped is not None
+    source = load_patient(PATIENT).source
+    assert source is not None
+    shipped = source.parent
     own, out = tmp_path / "patient", tmp_path / "out"
     (own / "recordings" / "barefoot").mkdir(parents=True)
     shutil.copy(shipped / "patient.yaml", own)

@@ -311,11 +311,14 @@ def test_values_that_are_no_defaults_are_those_of_the_problem(made_solution: Mad
 def test_a_changed_patient_and_a_quick_check_are_told(
     made_solution: MadeSolution, tmp_path: Path
 ) -> None:
-    config = made_solution().config.model_copy(update={"smoke": True})
+    file = tmp_path / "child.yaml"
+    content = load_patient("sreenivasa2017-patient").model_dump(mode="json", exclude_none=True)
+    file.write_text(yaml.safe_dump(content))
+    changes = {"smoke": True, "patient": str(file)}
+    config = made_solution().config.model_copy(update=changes)
     folder = write_made_run(tmp_path / "run", made_solution, "mapd-orthosis", config=config)
+    file.write_text(yaml.safe_dump({**content, "body_mass": 60.0}))
     metrics = json.loads((folder / "metrics.json").read_text())
-    (folder / "patient.yaml").unlink()
-    metrics["input_hashes"]["patient"] = "0" * 64
     metrics["reintegration_velocity_error"] = 0.02
     (folder / "metrics.json").write_text(json.dumps(metrics))
     warnings = page_of([folder]).warnings

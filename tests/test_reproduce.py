@@ -15,13 +15,13 @@ import pytest
 from click.testing import CliRunner, Result
 
 from helpers import stylised_series
+from pathwalker_cli.case import Case
 from pathwalker_cli.cli import cli
-from pathwalker_cli.config import StudyConfig, load_config
+from pathwalker_cli.config import load_config
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperNumber
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce import pipeline
 from pathwalker_cli.reproduce.comparison import Ours, Row
 from pathwalker_cli.reproduce.figures import save_paper_figures
@@ -45,14 +45,15 @@ class Solver:
         self.solved: list[str] = []
         self.failing: set[str] = set()
 
-    def __call__(self, study: StudyConfig, *_: object) -> GaitSolution:
+    def __call__(self, case: Case, *_: object) -> GaitSolution:
         """Return the end of a solve."""
+        study = case.config
         self.solved.append(study.problem)
-        walker = build_walker(load_patient(study.patient), study.condition)
+        walker = build_walker(case.patient, study.condition)
         optima = (OPTIMUM, replace(OPTIMUM, start=1, cost=0.5)) if study.starts > 1 else ()
         return self.made(
             "mapd-orthosis" if study.condition == "orthosis" else "mapd-barefoot",
-            config=study,
+            case=case,
             walker=walker,
             last_motion=stylised_series(study.condition).motion,
             bounds=gait_bounds(walker, study.bounds),
@@ -107,7 +108,10 @@ def done(written: Path, tmp_path: Path) -> Path:
 
 
 def test_quick_means_coarse_meshes_and_single_starts() -> None:
-    quick, full = planned_studies(8, True), planned_studies(8, False)
+    quick, full = (
+        {name: case.config for name, case in planned_studies(8, few).items()}
+        for few in (True, False)
+    )
     assert tuple(quick) == tuple(full) == ORDER
     assert all(study.smoke and study.starts == 1 for study in quick.values())
     assert all(study.mesh.refinements == 0 for study in quick.values())
@@ -197,10 +201,10 @@ def test_a_problem_that_does_not_converge_is_named(solver: Solver, tmp_path: Pat
 def test_a_stopped_call_goes_on(
     solver: Solver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def stopping(study: StudyConfig, *rest: object) -> GaitSolution:
-        if study.problem == "mapd-barefoot":
+    def stopping(case: Case, *rest: object) -> GaitSolution:
+        if case.config.problem == "mapd-barefoot":
             raise KeyboardInterrupt
-        return solver(study, *rest)
+        return solver(case, *rest)
 
     with monkeypatch.context() as patch:
         patch.setattr(study_run, "_solve", stopping)

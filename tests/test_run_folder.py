@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from helpers import STIFFNESS
+from pathwalker_cli.case import config_text
 from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import DataError, NotConvergedError
@@ -24,7 +25,6 @@ from pathwalker_cli.results.run_folder import (
     ENTRIES,
     Run,
     check_target,
-    config_text,
     load_run,
     warm_start_run,
     write_run,

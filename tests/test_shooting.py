@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Any, cast
 
@@ -11,9 +12,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from helpers import stylised_series, walker_of
+from pathwalker_cli.case import load_case
 from pathwalker_cli.config import load_config
 from pathwalker_cli.gait.bounds import gait_bounds
-from pathwalker_cli.gait.problem import GaitProblem, GaitWeights
+from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.shooting import (
     EXCITATIONS,
     gait_shooting,
@@ -55,7 +57,9 @@ def _blocks() -> ShootingBlocks:
 @cache
 def _numbers() -> ProblemNumbers:
     walker = walker_of("orthosis")
-    shared = GaitProblem(walker).shared_values(GaitWeights(rate=2e-2, acceleration=1e-3), 0.8)
+    shared = GaitProblem(walker).shared_values(
+        {"effort": 1.0, "rate": 2e-2, "acceleration": 1e-3}, 0.8
+    )
     table = gait_bounds(walker, load_config("mapd-orthosis").bounds).table
     excitations = {(name,): (0.0, 1.0) for name in EXCITATIONS}
     return ProblemNumbers(shared, table.replace(excitations), lambda phase, at: np.zeros(10))
@@ -339,11 +343,12 @@ FINE = (24, 34, 4, 12, 56, 6, 6, 12)
 @pytest.mark.slow
 def test_barefoot_prediction_agrees_with_collocation() -> None:
     """Cost, stride time and walking speed within 1 %, phases within 1 % of the stride time."""
-    config = load_config("mapd-barefoot")
-    coarse = GaitSolver(config).solve()
+    case = load_case("mapd-barefoot")
+    coarse, config = GaitSolver(case).solve(), case.config
     mesh = config.mesh.model_copy(update={"intervals": FINE, "refinements": 0})
     barrier = config.solver.model_copy(update={"warm_barrier": 1e-6})
-    solver = GaitSolver(config.model_copy(update={"mesh": mesh, "solver": barrier}))
+    finer = config.model_copy(update={"mesh": mesh, "solver": barrier})
+    solver = GaitSolver(replace(case, config=finer))
     solution = solver.solve(coarse.last_motion)
     assert solution.converged
     motion = solution.last_motion

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from helpers import stylised_series, walker_of
-from pathwalker_cli.config import load_config, with_values
+from pathwalker_cli.case import load_case
+from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import gait_bounds, helped_bounds
@@ -80,7 +81,7 @@ def test_who_is_too_weak_is_told_what_is_lacking_and_no_violations(
 def test_a_patient_too_weak_to_walk_is_a_result() -> None:
     coarse = {"mesh.intervals": 16, "mesh.refinements": 0, "solver.max_iterations": 100}
     weak = {"variation.scale": {"strengths": 0.15}}
-    solution = GaitSolver(with_values(load_config("mapd-barefoot"), coarse | weak)).solve()
+    solution = GaitSolver(load_case("mapd-barefoot").with_values(coarse | weak)).solve()
     names = [stage.name for stage in solution.stages]
     assert names == ["tracking", "first mesh", "helped", "first mesh again", "least help"]
     assert solution.status == TOO_WEAK
@@ -94,7 +95,7 @@ def test_a_patient_too_weak_to_walk_is_a_result() -> None:
 def test_bounds_that_contradict_each_other_are_not_blamed_on_muscles() -> None:
     coarse = {"mesh.intervals": 16, "mesh.refinements": 0, "solver.max_iterations": 20}
     stiff = {"bounds.joint_ranges": {"knee_r": [0.3, 0.31], "hip_r": [-0.31, -0.3]}}
-    solution = GaitSolver(with_values(load_config("mapd-barefoot"), coarse | stiff)).solve()
+    solution = GaitSolver(load_case("mapd-barefoot").with_values(coarse | stiff)).solve()
     assert solution.shortfall == Shortfall(within_bounds=False)
     assert solution.status != TOO_WEAK
 

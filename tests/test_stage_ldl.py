@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from pathwalker_cli.config import load_config
+from pathwalker_cli.case import load_case
 from pathwalker_cli.gait.mesh import first
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp.kernels import kernels
@@ -104,7 +104,7 @@ def test_an_equal_pattern_with_other_values() -> None:
 @pytest.fixture(scope="module")
 def solver() -> GaitSolver:
     changes = ("mesh.intervals=16", "mesh.refinements=0")
-    return GaitSolver(load_config("mapd-orthosis", changes=changes))
+    return GaitSolver(load_case("mapd-orthosis", changes=changes))
 
 
 def test_groups_are_small_whatever_the_mesh(solver: GaitSolver) -> None:
@@ -123,8 +123,7 @@ def test_groups_are_small_whatever_the_mesh(solver: GaitSolver) -> None:
 def test_ipopt_finds_the_same_with_mumps(solver: GaitSolver) -> None:
     found = []
     for extra in ({}, {"linear_solver": "mumps"}):
-        config = solver.config.solver.model_copy(update={"ipopt": {"max_iter": 1, **extra}})
-        again = GaitSolver(solver.config.model_copy(update={"solver": config}))
+        again = GaitSolver(solver.case.with_values({"solver.ipopt": {"max_iter": 1, **extra}}))
         _, result = again._track()
         found.append(result)
     ours, theirs = found

@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from pathwalker_cli.config import load_config
+from pathwalker_cli.case import load_case
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp import blocks
@@ -202,11 +202,11 @@ def test_an_unknown_operation_takes_the_other_path() -> None:
 @pytest.mark.parametrize("name", ["mapd-barefoot", "mapd-orthosis"])
 def test_gait_programs_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     changes = ("mesh.intervals=9", "mesh.refinements=0")
-    solver = GaitSolver(load_config(name, changes=changes))
+    solver = GaitSolver(load_case(name, changes=changes))
     config, stride = solver.config, solver.stride
     meshes = meshing.first(stride.durations[: len(solver.gait.phases)], config.mesh)
     program = CollocationProgram(solver.blocks, solver.prediction, meshes)
-    stiffness, costs = solver.parameter_guess(), len(solver.gait.integrals)
+    stiffness, costs = solver.parameter_guess(), len(solver.gait.costs.integrals)
     motion = stride.motion(solver.walker, stiffness, meshes, config.mesh.degree, costs)
     rng = np.random.default_rng(1)
     unknowns = program.to_unknowns(motion) + 0.01 * rng.normal(size=program.size)

@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 import pathwalker_cli
-from pathwalker_cli.config import load_config
+from pathwalker_cli.case import load_case
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait import structures
 from pathwalker_cli.gait.solve import GaitSolver
@@ -99,10 +99,10 @@ def test_sources_and_libraries_are_in_the_name(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_other_structures_have_another_name(folder: Path) -> None:
-    solvers = [GaitSolver(load_config(name)) for name in ("mapd-barefoot", "mapd-orthosis")]
+    solvers = [GaitSolver(load_case(name)) for name in ("mapd-barefoot", "mapd-orthosis")]
     keys = [(solver.gait.structure, degree) for solver in solvers for degree in (3, 4)]
     assert len({tape_store._path(key) for key in keys}) == 4
-    again = GaitSolver(load_config("mapd-barefoot", changes=("bounds.friction=0.3",)))
+    again = GaitSolver(load_case("mapd-barefoot", changes=("bounds.friction=0.3",)))
     assert tape_store._path((again.gait.structure, 3)) == tape_store._path(keys[0])
 
 
@@ -222,8 +222,8 @@ def test_processes_that_start_at_once_do_not_disturb_each_other(folder: Path) ->
 
 
 def test_a_further_process_derives_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    config = load_config("mapd-barefoot", changes=("mesh.intervals=16",))
-    solver = GaitSolver(config)
+    case = load_case("mapd-barefoot", changes=("mesh.intervals=16",))
+    solver = GaitSolver(case)
     monkeypatch.setitem(gait_blocks.__globals__, "_BUILT", {})
     first = gait_blocks(solver.gait, 3)
     assert file_of(folder).suffix == ".tapes"
@@ -231,7 +231,7 @@ def test_a_further_process_derives_nothing(folder: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(Tape, "of", lambda function: pytest.fail("derived again"))
     monkeypatch.setattr(Expressions, "_function", lambda *inputs: pytest.fail("built again"))
     again = gait_blocks(solver.gait, 3)
-    meshes = meshing.first(solver.stride.durations, config.mesh)
+    meshes = meshing.first(solver.stride.durations, solver.config.mesh)
     assert CollocationProgram(again, solver.prediction, meshes).functions
     monkeypatch.undo()
     for block, other in zip(first.blocks, again.blocks, strict=True):

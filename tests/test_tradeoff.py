@@ -15,9 +15,9 @@ import pytest
 from click.testing import CliRunner
 
 from made_neighbours import LIMIT, Fails, MadeResolver, made_measures, made_run, speed
+from pathwalker_cli.case import load_case
 from pathwalker_cli.cli import cli
 from pathwalker_cli.commands import tradeoff as command
-from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.studies import neighbours
@@ -53,7 +53,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
     def make(
         changes: tuple[str, ...] = FOUR, fails: Fails | None = None, errors: Any = (5e-4, 5e-3)
     ) -> tuple[Tradeoff, MadeResolver]:
-        resolver = MadeResolver(load_config("mapd-orthosis"), errors=errors)
+        resolver = MadeResolver(load_case("mapd-orthosis"), errors=errors)
         resolver.fails = fails or resolver.fails
         monkeypatch.setattr(neighbours, "resolver_of", lambda run: resolver)
         study = load_study("tradeoff", TradeoffStudy, changes)
@@ -70,13 +70,14 @@ def refined(monkeypatch: pytest.MonkeyPatch) -> dict[Path, dict[str, Any]]:
     status = {2.0: "the mesh does not reach the accuracy asked for"}
 
     class Solver:
-        def __init__(self, config: Any, log: Any) -> None:
-            self.config = config
+        def __init__(self, case: Any, log: Any) -> None:
+            self.case = case
 
         def solve(self, motion: Any) -> Any:
-            return self.config
+            return self.case
 
-    def write(folder: Path, config: Any, lines: Any) -> None:
+    def write(folder: Path, case: Any, lines: Any) -> None:
+        config = case.config
         weight = config.cost.walking_speed_weight
         numbers = {"cost": 0.3, "effort_per_distance": 0.2 + weight, "walking_speed": speed(config)}
         runs[folder] = {
@@ -87,7 +88,7 @@ def refined(monkeypatch: pytest.MonkeyPatch) -> dict[Path, dict[str, Any]]:
 
     monkeypatch.setattr(module, "GaitSolver", Solver)
     monkeypatch.setattr(module, "write_run", write)
-    monkeypatch.setattr(module, "is_done", lambda folder, config: folder in runs)
+    monkeypatch.setattr(module, "done_run", lambda folder, case: runs.get(folder))
     monkeypatch.setattr(
         module, "load_run",
         lambda folder, allow_unconverged: SimpleNamespace(metrics=runs[folder]),
@@ -211,7 +212,7 @@ def test_a_failed_solve_is_not_tried_again(made: Make) -> None:
 
 
 def test_a_fit_has_no_trade_off(tmp_path: Path) -> None:
-    run = made_run(tmp_path, load_config("ls-barefoot"))
+    run = made_run(tmp_path, load_case("ls-barefoot"))
     with pytest.raises(ConfigError, match="follows a recording"):
         tradeoff_of(TradeoffStudy(base=""), run, tmp_path, lambda line: None, RunLog())
 

@@ -78,8 +78,7 @@ def test_recorded_block_is_what_the_recordings_say(condition: Condition) -> None
 def test_recordings_there_and_back(tmp_path: Path) -> None:
     shipped = load_patient("sreenivasa2017-patient")
     trial = read_recording(shipped, "orthosis", "3053141")
-    assert shipped.folder is not None
-    source = shipped.folder / "recordings" / "orthosis"
+    source = shipped.recordings[0] / "orthosis"
     write_recording(tmp_path, trial)
     for kind in ("angles", "events", "forces"):
         name = f"3053141_{kind}.csv"

@@ -13,8 +13,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from neighbours_stand_in import StandInOptimum, StandInResolver, stand_in_measures
+from pathwalker_cli.case import load_case
 from pathwalker_cli.cli import cli
-from pathwalker_cli.config import load_config, study_patient, with_values
+from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.solution import GaitSolution
@@ -26,7 +27,7 @@ from pathwalker_cli.studies.base import base_run, load_study
 from pathwalker_cli.studies.uncertainty import study as module
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input, draw, inputs_of
 from pathwalker_cli.studies.uncertainty.result import chance_level, rank_correlations, spreads
-from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, draw_configs, uncertainty
+from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, draw_cases, uncertainty
 
 MadeSolution = Callable[..., GaitSolution]
 PATIENT = load_patient("sreenivasa2017-patient")
@@ -116,9 +117,9 @@ def test_places_that_do_not_exist_are_refused(
 
 
 def test_a_draw_comes_on_top_of_what_the_base_varies() -> None:
-    config = with_values(load_config("mapd-orthosis"), {"variation.scale": {"body_mass": 1.1}})
+    case = load_case("mapd-orthosis").with_values({"variation.scale": {"body_mass": 1.1}})
     draws = Draws((Input("body_mass", Distribution(relative=0.1)),), np.array([[0.9], [1.05]]))
-    masses = [study_patient(c).body_mass / PATIENT.body_mass for c in draw_configs(config, draws)]
+    masses = [each.patient.body_mass / PATIENT.body_mass for each in draw_cases(case, draws)]
     assert masses == pytest.approx([0.99, 1.155])
 
 
@@ -156,7 +157,7 @@ def run_folder_path(made_solution: MadeSolution, tmp_path_factory: pytest.TempPa
 
 @pytest.fixture
 def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
-    stand_in = StandInResolver(load_config("mapd-orthosis"))
+    stand_in = StandInResolver(load_case("mapd-orthosis"))
     for place in (module, pool):
         monkeypatch.setattr(place, "resolver_of", lambda run, tolerance: stand_in)
         monkeypatch.setattr(place, "measures", stand_in_measures)
@@ -215,8 +216,8 @@ def test_every_draw_can_be_solved_again_from_its_row(
     call()
     for row, solved in zip(table(tmp_path / "out" / "draws.csv"), resolver.solved, strict=True):
         again = load_config("mapd-orthosis", changes=(f"variation={row['variation']}",))
-        assert again.variation == solved.variation
-        assert float(row["strengths [factor]"]) == solved.variation.scale["strengths"]
+        assert again.variation == solved.config.variation
+        assert float(row["strengths [factor]"]) == solved.config.variation.scale["strengths"]
         assert json.loads(row["variation"])["shift"].keys() == {"orthosis.neutral_angle"}
 
 
@@ -254,10 +255,10 @@ def test_a_killed_study_goes_on_where_it_was(
 ) -> None:
     solve = resolver.resolve
 
-    def dying(config: Any, start: Any = None) -> StandInOptimum:
+    def dying(case: Any, start: Any = None) -> StandInOptimum:
         if len(resolver.solved) == 7:
             raise KeyboardInterrupt
-        return solve(config, start)
+        return solve(case, start)
 
     monkeypatch.setattr(resolver, "resolve", dying)
     assert call().exit_code != 0
@@ -298,15 +299,14 @@ def test_refusals(call: Callable[..., Result], words: tuple[str, ...], message: 
 def test_shipped_config_fits_the_shipped_patient() -> None:
     study = load_study("uncertainty", UncertaintyStudy)
     inputs = inputs_of(study.quantities, PATIENT)
-    configs = draw_configs(load_config("mapd-orthosis"), draw(inputs, study.draws, study.seed))
-    assert len(configs) == 100
+    cases = draw_cases(load_case("mapd-orthosis"), draw(inputs, study.draws, study.seed))
+    assert len(cases) == 100
 
 
 @pytest.mark.slow
 def test_real_draws_do_not_depend_on_the_number_of_processes(tmp_path: Path) -> None:
     coarse = {"mesh.intervals": 16, "mesh.refinements": 0, "solver.first_tolerance": 1e-6}
-    config = with_values(load_config("mapd-orthosis"), coarse)
-    run = base_run(config, tmp_path / "base")
+    run = base_run(load_case("mapd-orthosis").with_values(coarse), tmp_path / "base")
     quantities = {
         "strengths": Distribution(relative=0.05),
         "body_mass": Distribution(relative=0.02),

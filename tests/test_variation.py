@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pathwalker_cli.config import load_config, study_patient, with_values
+from pathwalker_cli.case import load_case
 from pathwalker_cli.errors import ConfigError, PatientError
 from pathwalker_cli.gait.mesh import uniform
 from pathwalker_cli.gait.solve import GaitSolver
@@ -67,15 +67,15 @@ def test_what_does_not_fit_is_refused(
     variation: dict[str, dict[str, float]], error: type[Exception], words: str
 ) -> None:
     with pytest.raises(error, match=words.replace("?", r"\?")):
-        study_patient(with_values(load_config("mapd-orthosis"), {"variation": variation}))
+        _ = load_case("mapd-orthosis").with_values({"variation": variation}).patient
 
 
 def test_patients_of_one_structure_share_their_blocks() -> None:
-    base = load_config("mapd-orthosis")
-    heavy = with_values(base, {"variation.scale": {"body_mass": 1.2, "strengths": 0.8}})
+    base = load_case("mapd-orthosis")
+    heavy = base.with_values({"variation.scale": {"body_mass": 1.2, "strengths": 0.8}})
     first, second = GaitSolver(base), GaitSolver(heavy)
     assert first.blocks is second.blocks
-    own = CollocationBlocks(second.gait.build(), base.mesh.degree)
+    own = CollocationBlocks(second.gait.build(), base.config.mesh.degree)
     meshes = uniform([1] * 8)
     shared, fresh = (CollocationProgram(b, second.prediction, meshes) for b in (first.blocks, own))
     x = np.random.default_rng(0).normal(0.1, 0.1, shared.layout.size)

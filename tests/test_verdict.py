@@ -10,7 +10,8 @@ import pytest
 
 from conftest import MadeSolution
 from helpers import stylised_series
-from pathwalker_cli.config import load_config, smoke_version, with_values
+from pathwalker_cli.case import load_case
+from pathwalker_cli.config import load_config, smoke_version
 from pathwalker_cli.errors import PatientError
 from pathwalker_cli.gait.solution import LocalOptimum
 from pathwalker_cli.gait.solve import GaitSolver
@@ -204,9 +205,8 @@ def test_the_shipped_springs_lie_in_their_range() -> None:
 
 @pytest.mark.slow
 def test_a_real_verdict_encloses_the_identified_springs() -> None:
-    config = load_config("mapd-orthosis")
-    config = with_values(config, {"mesh.intervals": 24, "mesh.refinements": 0})
-    solution = GaitSolver(config).solve()
+    coarse = {"mesh.intervals": 24, "mesh.refinements": 0}
+    solution = GaitSolver(load_case("mapd-orthosis").with_values(coarse)).solve()
     found = verdict_of(solution)
     assert found is not None
     for spring in found.springs:

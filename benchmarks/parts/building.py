@@ -33,7 +33,7 @@ def steps(problem: str, intervals: int) -> dict[str, float]:
         intervals: Intervals of the mesh.
     """
     began = time.process_time()
-    from pathwalker_cli.config import load_config, study_patient
+    from pathwalker_cli.case import load_case
     from pathwalker_cli.gait import mesh as meshing
     from pathwalker_cli.gait.solve import GaitSolver
     from pathwalker_cli.model.walker import build_walker
@@ -41,12 +41,11 @@ def steps(problem: str, intervals: int) -> dict[str, float]:
     from pathwalker_cli.ocp.collocation import CollocationProgram
 
     imports = time.process_time() - began
-    config = load_config(problem)
+    case = load_case(problem)
+    config = case.config
     model, condition = config.model, config.condition
-    walker, _ = timed(
-        lambda: build_walker(study_patient(config), condition, model.published, model.backend)
-    )
-    blocks, solver = timed(lambda: GaitSolver(config))
+    walker, _ = timed(lambda: build_walker(case.patient, condition, model.published, model.backend))
+    blocks, solver = timed(lambda: GaitSolver(case))
     durations = solver.stride.durations[: len(solver.gait.phases)]
 
     def functions(count: int) -> CollocationProgram:

@@ -15,7 +15,7 @@ from typing import Any, Final
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.config import load_config
+from pathwalker_cli.case import load_case
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp import blocks
 from pathwalker_cli.nlp.assembly import FUNCTIONS
@@ -58,8 +58,8 @@ def steps(
         repetitions: How often they are measured.
     """
     mesh = (f"mesh.intervals={intervals}", "mesh.refinements=0")
-    config = load_config(problem, changes=(*mesh, f"solver.max_iterations={tracking}"))
-    solver = GaitSolver(config)
+    case = load_case(problem, changes=(*mesh, f"solver.max_iterations={tracking}"))
+    solver, config = GaitSolver(case), case.config
     tracked, result = solver._track()
     motion = replace(tracked.to_motion(result.unknowns), parameters=solver.parameter_guess())
     if variant == "casadi":

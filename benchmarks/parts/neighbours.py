@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any, Final
 
 from parts.building import timed
-from pathwalker_cli.config import with_values
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.neighbourhood import Neighbourhood
 from pathwalker_cli.gait.resolve import Optimum, Resolver
@@ -39,9 +38,9 @@ def figures(folder: str) -> dict[str, Any]:
         return result
 
     run = load_run(folder)
-    note("blocks of the first case", lambda: GaitSolver(run.config))
+    note("blocks of the first case", lambda: GaitSolver(run.case))
     for _ in range(3):
-        note("blocks of a further case", lambda: GaitSolver(run.config))
+        note("blocks of a further case", lambda: GaitSolver(run.case))
     resolver = note("solver of neighbours", lambda: resolver_of(run))
     note("the run itself, warm, with derivatives", lambda: resolver.optimum)
     _solve(resolver, note)
@@ -60,7 +59,7 @@ def figures(folder: str) -> dict[str, Any]:
 def _solve(resolver: Resolver, note: Callable[[str, Callable[[], Any]], Any]) -> None:
     """Solve the neighbours."""
     optimum = resolver.optimum
-    note("nothing changed, warm", lambda: resolver.resolve(optimum.config))
+    note("nothing changed, warm", lambda: resolver.resolve(optimum.case))
     changes: list[tuple[str, Mapping[str, Any]]] = [
         (SPRINGS, {"bounds.stiffness": {name: [0.95 * float(value)] * 2}})
         for name, value in zip(STIFFNESSES, optimum.stiffness, strict=True)
@@ -68,4 +67,4 @@ def _solve(resolver: Resolver, note: Callable[[str, Callable[[], Any]], Any]) ->
     changes.append(("all strengths 10 % lower, warm", {"variation.scale": {"strengths": 0.9}}))
     changes.append(("body mass 5 % higher, warm", {"variation.scale": {"body_mass": 1.05}}))
     for name, change in changes:
-        note(name, partial(resolver.resolve, with_values(optimum.config, change)))
+        note(name, partial(resolver.resolve, optimum.case.with_values(change)))

@@ -99,7 +99,7 @@ def run_frames(folders: Sequence[Path], rate: float) -> tuple[GaitFrames, ...]:
 
     Raises:
         DataError: If one is no run folder, did not converge, holds no full stride or comes twice.
-        PatientError: If a patient is no longer there.
+        PatientError: If a patient that a run keeps is damaged.
     """
     names = run_names(folders)
     strides = [stride_of_run(folder) for folder in folders]

@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pathwalker_cli.case import Case
 from pathwalker_cli.checking.expect import expected
 from pathwalker_cli.checking.plausible import odd_patient
 from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.checking.sense import contradictions, oddities
-from pathwalker_cli.config import StudyConfig, load_config, study_patient
+from pathwalker_cli.config import load_config
 from pathwalker_cli.config.values import changed_values
 from pathwalker_cli.conventions import CONDITIONS, STIFFNESSES
-from pathwalker_cli.errors import DataError, PatientError, placed
+from pathwalker_cli.errors import DataError, placed
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.recordings import recording_names
@@ -50,48 +51,37 @@ def check_prediction(path: str, changes: Changes = (), problem: str = "") -> Che
         InputError: The first thing that is wrong.
     """
     config = load_config(path, problem, changes)
-    solver = ready_solver(config, path)
-    return described(solver, path)
+    with placed(path):
+        case = Case.of(config)
+    return described(ready_solver(case, path), path)
 
 
-def ready_solver(config: StudyConfig, where: str) -> GaitSolver:
-    """Return the solver of a config, with everything checked that needs no solve.
+def ready_solver(case: Case, where: str) -> GaitSolver:
+    """Return the solver of a case, with everything checked that needs no solve.
 
     Args:
-        config: The config.
+        case: The case.
         where: Its file, for messages.
 
     Raises:
         InputError: The first thing that is wrong.
     """
     with placed(where):
-        check_patient(config, _patient(config))
-        solver = _solver(config)
+        check_patient(case)
+        solver = _solver(case)
         for error in contradictions(solver):
             raise error
     return solver
 
 
-def _patient(config: StudyConfig) -> Patient:
-    """Return the patient; an error without a place gets that of the key."""
-    try:
-        return study_patient(config)
-    except PatientError as error:
-        where = error.where or "patient"
-        raise PatientError(
-            error.what, where=where, allowed=error.allowed, mend=error.mend
-        ) from None
-
-
-def _solver(config: StudyConfig) -> GaitSolver:
+def _solver(case: Case) -> GaitSolver:
     """Return the solver; what lacks for a recorded start is an error of the start."""
     try:
-        solver = GaitSolver(config)
+        solver = GaitSolver(case)
         _ = solver.stride
     except DataError as error:
-        key = "start.trial" if config.start.trial else "start.gait"
-        where = f"{key}: {error.where}" if error.where else key
-        raise DataError(error.what, where=where, allowed=error.allowed, mend=error.mend) from None
+        key = "start.trial" if case.config.start.trial else "start.gait"
+        raise error.at(f"{key}: {error.where}" if error.where else key) from None
     return solver
 
 

@@ -7,13 +7,12 @@ from typing import Any
 
 from pathwalker_cli.checking.prediction import described, ready_solver, walker_rows
 from pathwalker_cli.checking.report import Changes, Checked, Row
-from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError, placed
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.patient import Patient, load_patient
+from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.variation import Variation, varied
-from pathwalker_cli.studies.base import NeighbourStudy, base_config, load_study
+from pathwalker_cli.studies.base import NeighbourStudy, base_case, load_study
 from pathwalker_cli.studies.batch.cases import load_cases
 from pathwalker_cli.studies.landscape.study import LandscapeStudy, axis_values
 from pathwalker_cli.studies.perturbation.study import PerturbationStudy, moved_springs
@@ -21,7 +20,7 @@ from pathwalker_cli.studies.sensitivity.study import SensitivityStudy, asked_pla
 from pathwalker_cli.studies.springs import Ranges, free_springs, require_springs
 from pathwalker_cli.studies.tradeoff.study import TradeoffStudy, require_prediction
 from pathwalker_cli.studies.uncertainty.draws import draw, inputs_of
-from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, draw_configs
+from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, draw_cases
 
 __all__ = [
     "check_batch",
@@ -73,9 +72,8 @@ def check_uncertainty(path: str, changes: Changes = ()) -> Checked:
     study = load_study(path, UncertaintyStudy, changes)
     solver = _base(study, path, springs=True)
     with placed(path):
-        patient = load_patient(solver.config.patient)
-        draws = draw(inputs_of(study.quantities, patient), study.draws, study.seed)
-        draw_configs(solver.config, draws)
+        draws = draw(inputs_of(study.quantities, solver.case.unvaried), study.draws, study.seed)
+        draw_cases(solver.case, draws)
     what = f"{study.draws} draws of {len(draws.inputs)} numbers, seed {study.seed}"
     return _study(path, "uncertainty", solver, study.draws, what)
 
@@ -117,7 +115,7 @@ def check_batch(path: str, changes: Changes = ()) -> Checked:
     notes: list[str] = []
     seconds = 0.0
     for case in batch.cases:
-        found = described(ready_solver(case.config, f"{path}, case {case.name}"), path)
+        found = described(ready_solver(case.study, f"{path}, case {case.name}"), path)
         seconds += found.content["expected_seconds"]["likely"]
         notes += [note for note in found.notes if note not in notes]
     patients = list(dict.fromkeys(case.patient for case in batch.cases))
@@ -148,13 +146,12 @@ def _base(study: NeighbourStudy, path: str, springs: bool = False) -> GaitSolver
         InputError: If the base is wrong, or has no springs where they are needed.
     """
     with placed(f"{path}, base"):
-        config: StudyConfig = base_config(study)
+        case = base_case(study)
         if springs:
-            require_springs(config, study.base)
-    tolerance = getattr(study, "tolerance", None)
+            require_springs(case.config, study.base)
     if isinstance(study, PerturbationStudy | SensitivityStudy | UncertaintyStudy):
-        config = with_values(config, {"solver.tolerance": tolerance})
-    return ready_solver(config, f"{path}, base {Path(study.base).name}")
+        case = case.with_values({"solver.tolerance": study.tolerance})
+    return ready_solver(case, f"{path}, base {Path(study.base).name}")
 
 
 def _ranges(solver: GaitSolver) -> Ranges:

@@ -41,7 +41,7 @@ def evaluate_command(
     from pathwalker_cli.evaluation.run import gaits_of_runs
     from pathwalker_cli.evaluation.tables import evaluation_content
 
-    gaits = gaits_of_runs(runs)
+    gaits = [gait for _, gait in gaits_of_runs(runs)]
     trials = _trials(gaits, trial)
     evaluations = [evaluate_gait(gait, name) for gait, name in zip(gaits, trials, strict=True)]
     changes = _changes(evaluations)

@@ -63,7 +63,9 @@ def study_options(out: str) -> Callable[[Command], Command]:
     return decorate
 
 
-def base_of(study: NeighbourStudy, run: Path | None, out: Path, quiet: bool) -> Run:
+def base_of(
+    study: NeighbourStudy, run: Path | None, out: Path, quiet: bool, springs: bool = False
+) -> Run:
     """Return the run that a study stands on: the given one, or the base solved now.
 
     Args:
@@ -71,19 +73,25 @@ def base_of(study: NeighbourStudy, run: Path | None, out: Path, quiet: bool) -> 
         run: Folder of the given run.
         out: Folder of the results.
         quiet: Whether nothing shall be shown.
+        springs: Whether the problem must have springs.
 
     Raises:
-        ConfigError: If a run is given and the study overrides values of the base.
+        ConfigError: If a run is given and the study overrides values of the base, or if there are
+            no springs where they are needed.
         DataError: If the run cannot be used.
     """
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
     from pathwalker_cli.results.run_folder import load_run
-    from pathwalker_cli.studies.base import base_config, base_run
+    from pathwalker_cli.studies.base import base_case, base_run
+    from pathwalker_cli.studies.springs import require_springs
 
     if run is None:
+        case = base_case(study)
+        if springs:
+            require_springs(case.config, f"base {study.base}")
         with Progress(quiet) as progress:
-            return base_run(base_config(study), out / "base", progress)
+            return base_run(case, out / "base", progress)
     if study.set:
         raise ConfigError(
             "overrides values of the base, but --run brings a config of its own",
@@ -91,9 +99,12 @@ def base_of(study: NeighbourStudy, run: Path | None, out: Path, quiet: bool) -> 
             mend="leave one of the two out",
         )
     try:
-        return load_run(run)
+        found = load_run(run)
     except NotConvergedError as error:
         raise DataError(str(error), where="--run", allowed="a converged run") from None
+    if springs:
+        require_springs(found.config, f"--run {run}")
+    return found
 
 
 def teller(quiet: bool) -> Callable[[str], None]:

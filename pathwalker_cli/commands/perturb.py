@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -11,11 +10,7 @@ from pathwalker_cli.commands.json_output import print_json
 from pathwalker_cli.commands.kinds import meant_as
 from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
 
-if TYPE_CHECKING:
-    from pathwalker_cli.results.run_folder import Run
-    from pathwalker_cli.studies.base import NeighbourStudy
-
-__all__ = ["base_with_springs", "perturb_command"]
+__all__ = ["perturb_command"]
 
 ENTRIES = frozenset({"base", "points", "figures", "perturbation.csv", "perturbation.json"})
 """All that the command writes."""
@@ -54,7 +49,7 @@ def perturb_command(
     with claimed_folder(out, ENTRIES, "perturb"):
         result = perturb(
             study,
-            base_with_springs(study, run, out, quiet),
+            base_of(study, run, out, quiet, springs=True),
             out,
             lambda row: tell(
                 f"{row.label}: {row.status}, {row.iterations} iterations, {row.seconds:.1f} s"
@@ -70,27 +65,3 @@ def perturb_command(
     if result.failed:
         failed = ", ".join(row.label for row in result.failed)
         raise NotConvergedError(f"no solution was found for {failed}; {out} holds the others")
-
-
-def base_with_springs(study: NeighbourStudy, run: Path | None, out: Path, quiet: bool) -> Run:
-    """Return the run with springs that a study stands on, read or solved now.
-
-    Args:
-        study: The study.
-        run: Folder of a run to use; None to solve the base of the study.
-        out: Folder of the study, which takes the base.
-        quiet: Whether to show nothing.
-
-    Raises:
-        ConfigError: If there are no springs in it, or the study also overrides its values.
-        DataError: If the run cannot be used.
-        NotConvergedError: If the base did not converge.
-    """
-    from pathwalker_cli.studies.base import base_config
-    from pathwalker_cli.studies.springs import require_springs
-
-    if run is None:
-        require_springs(base_config(study), f"base {study.base}")
-    found = base_of(study, run, out, quiet)
-    require_springs(found.config, f"--run {run}")
-    return found

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
-    from pathwalker_cli.config import StudyConfig
+    from pathwalker_cli.case import Case
 
 __all__ = ["reproduce_command"]
 
@@ -55,8 +55,8 @@ def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, qui
         if not quiet:
             click.echo(line)
 
-    def solve(study: StudyConfig, folder: Path) -> None:
-        _solve(study, folder, quiet)
+    def solve(case: Case, folder: Path) -> None:
+        _solve(case, folder, quiet)
 
     with claimed_folder(out, ENTRIES, "reproduce"):
         results = reproduce(out, solve, say, starts, quick, c3d)
@@ -68,7 +68,7 @@ def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, qui
         )
 
 
-def _solve(study: StudyConfig, folder: Path, quiet: bool) -> None:
+def _solve(case: Case, folder: Path, quiet: bool) -> None:
     """Solve a study into its run folder.
 
     Raises:
@@ -80,11 +80,11 @@ def _solve(study: StudyConfig, folder: Path, quiet: bool) -> None:
 
     try:
         with Progress(quiet) as progress:
-            solution = run_study(study, folder, log=progress).solution
+            solution = run_study(case, folder, log=progress).solution
         stopped = solution.status == "stopped by the user"
     except KeyboardInterrupt:
         stopped = True
     if stopped:
         raise NotConvergedError(
-            f"stopped by the user in {study.problem}; the same command goes on from there"
+            f"stopped by the user in {case.config.problem}; the same command goes on from there"
         )

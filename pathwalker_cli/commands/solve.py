@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from pathwalker_cli.config import StudyConfig
-    from pathwalker_cli.patient import Patient
+    from pathwalker_cli.case import Case
     from pathwalker_cli.studies.run import Outcome
 
 __all__ = ["solve_command"]
@@ -70,10 +69,10 @@ def solve_command(
     from pathwalker_cli.results.text import failure_text
     from pathwalker_cli.studies.run import run_study
 
-    study, patient = _study(problem, config, changes, smoke)
-    folder = out or default_folder(study, patient.id)
-    with claimed_run(folder), Progress(quiet, heading=_worn(study, patient)) as progress:
-        outcome = run_study(study, folder, warm_start, progress)
+    case = _case(problem, config, changes, smoke)
+    folder = out or default_folder(case.config, case.patient.id)
+    with claimed_run(folder), Progress(quiet, heading=_worn(case)) as progress:
+        outcome = run_study(case, folder, warm_start, progress)
     solution = outcome.solution
     if as_json:
         print_json(_content(outcome, folder))
@@ -83,36 +82,28 @@ def solve_command(
         raise NotConvergedError(failure_text(solution, str(folder)))
 
 
-def _study(
-    problem: str, path: str, changes: tuple[str, ...], smoke: bool
-) -> tuple[StudyConfig, Patient]:
+def _case(problem: str, path: str, changes: tuple[str, ...], smoke: bool) -> Case:
     """Return the config with all overrides, and its patient."""
-    from pathwalker_cli.config import load_config, smoke_version, study_patient
-    from pathwalker_cli.errors import PatientError
+    from dataclasses import replace
+
+    from pathwalker_cli.case import load_case
+    from pathwalker_cli.config import smoke_version
     from pathwalker_cli.problems import problem_named
 
     problem_named(problem)
     with meant_as("prediction", path):
-        study = load_config(path, problem, changes)
-    try:
-        patient = study_patient(study)
-    except PatientError as error:
-        if error.where:
-            raise
-        where = f"{path}, patient"
-        raise PatientError(
-            error.what, where=where, allowed=error.allowed, mend=error.mend
-        ) from None
-    return smoke_version(study) if smoke else study, patient
+        case = load_case(path, problem, changes)
+    return replace(case, config=smoke_version(case.config)) if smoke else case
 
 
-def _worn(study: StudyConfig, patient: Patient) -> tuple[str, ...]:
+def _worn(case: Case) -> tuple[str, ...]:
     """Return what is worn, to be read while the solve runs: a wrong sign shows as a direction."""
     from pathwalker_cli.results.text import orthosis_rows
 
-    if study.condition == "barefoot" or patient.orthosis is None:
+    worn = case.patient.orthosis
+    if case.config.condition == "barefoot" or worn is None:
         return ()
-    return tuple(f"{label}: {text}" for label, text in orthosis_rows(patient.orthosis))
+    return tuple(f"{label}: {text}" for label, text in orthosis_rows(worn))
 
 
 def _content(outcome: Outcome, folder: Path) -> dict[str, Any]:

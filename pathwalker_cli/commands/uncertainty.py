@@ -10,7 +10,7 @@ import click
 
 from pathwalker_cli.commands.json_output import print_json
 from pathwalker_cli.commands.kinds import meant_as
-from pathwalker_cli.commands.neighbour_study import study_options, teller
+from pathwalker_cli.commands.neighbour_study import base_of, study_options, teller
 
 if TYPE_CHECKING:
     from pathwalker_cli.studies.pool import Solved
@@ -60,7 +60,6 @@ def uncertainty_command(
     """
     import os
 
-    from pathwalker_cli.commands.perturb import base_with_springs
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.studies.base import claimed_folder, load_study
     from pathwalker_cli.studies.uncertainty.figures import save_uncertainty_figures
@@ -75,7 +74,7 @@ def uncertainty_command(
         study = load_study(config, UncertaintyStudy, changes)
     count = workers or len(os.sched_getaffinity(0))
     with claimed_folder(out, ENTRIES, "uncertainty"):
-        base = base_with_springs(study, run, out, quiet)
+        base = base_of(study, run, out, quiet, springs=True)
         result = uncertainty(study, base, out, count, _counted(study.draws, teller(quiet)))
         write_uncertainty(result, out)
         save_uncertainty_figures(result, out / "figures")

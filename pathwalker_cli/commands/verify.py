@@ -76,7 +76,7 @@ def rerun_command(run: Path, out: Path | None, quiet: bool) -> None:
     """
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.results.run_folder import claimed_run, load_run, repeatable_config
+    from pathwalker_cli.results.run_folder import claimed_run, load_run
     from pathwalker_cli.results.text import failure_text
     from pathwalker_cli.studies.run import run_study
     from pathwalker_cli.verification.again import difference_lines
@@ -84,7 +84,7 @@ def rerun_command(run: Path, out: Path | None, quiet: bool) -> None:
     before = load_run(run, allow_unconverged=True)
     folder = out or run.with_name(f"{run.resolve().name}-again")
     with claimed_run(folder), Progress(quiet) as progress:
-        outcome = run_study(repeatable_config(before), folder, None, progress)
+        outcome = run_study(before.case, folder, None, progress)
     if not outcome.solution.converged:
         raise NotConvergedError(failure_text(outcome.solution, str(folder)))
     if not quiet:

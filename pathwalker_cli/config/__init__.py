@@ -9,7 +9,6 @@ from pathwalker_cli.config.files import (
     patient_path,
     place_of,
     read_config,
-    study_patient,
 )
 from pathwalker_cli.config.overrides import apply_change, smoke_version, with_values
 from pathwalker_cli.config.schema import (
@@ -38,6 +37,5 @@ __all__ = [
     "place_of",
     "read_config",
     "smoke_version",
-    "study_patient",
     "with_values",
 ]

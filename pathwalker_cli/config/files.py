@@ -14,8 +14,6 @@ from pathwalker_cli.config.schema import StudyConfig
 from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.io.yaml_file import KeyPath, Lines, read_mapping, validate
 from pathwalker_cli.paths import shipped
-from pathwalker_cli.patient import Patient, load_patient
-from pathwalker_cli.patient.variation import varied
 
 __all__ = [
     "config_content",
@@ -24,7 +22,6 @@ __all__ = [
     "patient_path",
     "place_of",
     "read_config",
-    "study_patient",
 ]
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -115,13 +112,3 @@ def patient_path(patient: str, folder: Path) -> str:
     """Return a patient path relative to a folder as a full path; ids stay."""
     candidate = folder / patient
     return str(candidate.resolve()) if "/" in patient or os.path.isfile(candidate) else patient
-
-
-def study_patient(config: StudyConfig) -> Patient:
-    """Return the patient of a study, with its variation.
-
-    Raises:
-        PatientError: If there is no such patient or its file is refused.
-        ConfigError: If the variation does not fit the patient.
-    """
-    return varied(load_patient(config.patient), config.variation)

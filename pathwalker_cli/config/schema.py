@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, field_validator, mo
 from pathwalker_cli.config.nested import merged
 from pathwalker_cli.conventions import ANGLES, STIFFNESSES, Condition
 from pathwalker_cli.errors import did_you_mean
-from pathwalker_cli.gait.goals import COMFORT_COORDINATES, GOALS, Goals
+from pathwalker_cli.gait.costs import COMFORT_COORDINATES, GOALS, Costs
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.patient.blocks import Stiffness
@@ -114,10 +114,10 @@ class CostConfig(YamlModel):
         return self
 
     @property
-    def wanted(self) -> Goals:
+    def wanted(self) -> Costs:
         """The goals that have a weight, and what they need."""
         names = tuple(name for name in GOALS if self.goals.get(name, 0.0) > 0.0)
-        return Goals(names, self.activation_power, self.comfort_ranges)
+        return Costs(names, self.activation_power, self.comfort_ranges)
 
 
 class BoundsConfig(YamlModel):

@@ -112,7 +112,7 @@ class RecordedGait:
 
 
 def recorded_gait(walker: Walker) -> RecordedGait | None:
-    """Return the recordings beside the patient's file in the walker's condition.
+    """Return the recordings of the patient in the walker's condition.
 
     Args:
         walker: The walker; its patient says where the recordings are.
@@ -124,7 +124,7 @@ def recorded_gait(walker: Walker) -> RecordedGait | None:
         DataError: If a recording cannot be used.
     """
     patient, condition = walker.patient, walker.condition
-    if patient.folder is None or not recording_names(patient, condition):
+    if not recording_names(patient, condition):
         return None
     config = InverseDynamicsConfig(
         study="inverse-dynamics", patient=patient.id, conditions=(condition,)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
-from pathwalker_cli.config import study_patient
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.results.run_folder import Run, load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import Stride, stride_of
@@ -18,22 +15,21 @@ from pathwalker_cli.stride.stride import Stride, stride_of
 __all__ = [
     "gait_of_run",
     "gaits_of_runs",
+    "run_and_gait",
     "run_names",
     "run_notes",
     "stride_of_run",
 ]
 
 
-def gaits_of_runs(folders: Sequence[Path]) -> tuple[Stride, ...]:
-    """Return the gaits of several runs under names that differ.
+def gaits_of_runs(folders: Sequence[Path]) -> tuple[tuple[Run, Stride], ...]:
+    """Return several runs with their gaits under names that differ.
 
     Raises:
         DataError: If a run is named twice or cannot be used.
     """
     names = run_names(folders)
-    return tuple(
-        replace(gait_of_run(folder), name=name) for folder, name in zip(folders, names, strict=True)
-    )
+    return tuple(run_and_gait(folder, name) for folder, name in zip(folders, names, strict=True))
 
 
 def run_names(folders: Sequence[Path]) -> tuple[str, ...]:
@@ -60,7 +56,7 @@ def stride_of_run(folder: str | Path) -> tuple[Run, GaitSeries]:
 
     Raises:
         DataError: If it is no run folder, did not converge or holds no full stride.
-        PatientError: If the patient is no longer there.
+        PatientError: If the patient that it keeps is damaged.
     """
     try:
         run = load_run(folder)
@@ -75,10 +71,7 @@ def stride_of_run(folder: str | Path) -> tuple[Run, GaitSeries]:
             where=str(folder),
             allowed="a stride of both legs in eight phases",
         )
-    config = run.config
-    patient = study_patient(config)
-    walker = build_walker(patient, config.condition, config.model.published)
-    return run, gait_series(walker, run.motion)
+    return run, gait_series(run.case.walker(), run.motion)
 
 
 def run_notes(run: Run) -> tuple[str, ...]:
@@ -94,7 +87,12 @@ def gait_of_run(folder: str | Path) -> Stride:
 
     Raises:
         DataError: If it is no run folder, did not converge or holds no full stride.
-        PatientError: If the patient is no longer there.
+        PatientError: If the patient that it keeps is damaged.
     """
+    return run_and_gait(folder, Path(folder).resolve().name)[1]
+
+
+def run_and_gait(folder: str | Path, name: str) -> tuple[Run, Stride]:
+    """Return a converged run and its gait under a name; see `gait_of_run`."""
     run, series = stride_of_run(folder)
-    return stride_of(series, Path(folder).resolve().name, run.config.problem, run_notes(run))
+    return run, stride_of(series, name, run.config.problem, run_notes(run))

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
 
 import casadi as ca
 import numpy as np
 
 from pathwalker_cli.conventions import mirror_permutation
-from pathwalker_cli.gait.goals import Goals
+from pathwalker_cli.gait.costs import Costs, Totals
 from pathwalker_cli.ocp.problem import INFINITY, Boundary, Instant, Rows, Variables
 
-__all__ = ["PER_DISTANCE", "gait_boundary"]
-
-PER_DISTANCE: Final = ("effort", "rate", "acceleration")
-"""Running costs that are divided by the distance."""
+__all__ = ["gait_boundary"]
 
 Groups = tuple[Variables, Variables, Variables]
 
@@ -24,9 +20,8 @@ Groups = tuple[Variables, Variables, Variables]
 def gait_boundary(
     groups: Groups,
     parameters: Variables,
-    integrals: Sequence[str],
+    costs: Costs,
     weights: Mapping[str, ca.SX],
-    goals: Goals,
     phases: int,
     mirrored: bool,
     start: Rows | None = None,
@@ -36,9 +31,8 @@ def gait_boundary(
     Args:
         groups: States (pelvis_tx first), activations and their rates.
         parameters: Free parameters; of a mirrored gait left and right are equal.
-        integrals: Names of the running costs.
-        weights: Weight of every cost term by name.
-        goals: Clinical goals.
+        costs: The cost terms.
+        weights: Weight of every one by name.
         phases: Number of phases.
         mirrored: Whether the phases are one step and the other is its mirror image.
         start: Rows in the first instant's states (the symbol of `groups[0]`) of a passage that
@@ -46,7 +40,7 @@ def gait_boundary(
     """
     first, last = _instant(groups, "first"), _instant(groups, "last")
     durations = ca.SX.sym("durations", phases)
-    totals = ca.SX.sym("integrals", len(integrals))
+    totals = ca.SX.sym("integrals", len(costs.integrals))
     steps = 2 if mirrored else 1  # distance, time and costs are those of a whole stride
     distance = steps * (last[0][0] - first[0][0])
     time = steps * ca.sum1(durations)
@@ -62,16 +56,8 @@ def gait_boundary(
     else:
         ends = [_at_first(start, groups[0], first[0])]
     rows = Rows.join(*ends, *([_symmetry(parameters)] if mirrored else []), free)
-    total = dict(zip(integrals, ca.vertsplit(steps * totals), strict=True))
-    objective = sum(weights[name] * total[name] for name in PER_DISTANCE) / distance
-    objective += weights["tracking"] * total["tracking"]
-    objective += weights["reserve"] * total["reserve"]
-    objective += weights["smoothing"] * (total["effort"] + total["rate"])
-    objective -= weights["walking_speed"] * distance / time
-    for name, value in goals.values(total, distance, time, ca.vertsplit(durations)).items():
-        objective += weights[name] * value
-    if "excitation" in total:
-        objective += weights["excitation"] * total["excitation"]
+    total = dict(zip(costs.integrals, ca.vertsplit(steps * totals), strict=True))
+    objective = costs.objective(weights, Totals(total, distance, time, ca.vertsplit(durations)))
     return Boundary(first, last, durations, totals, rows, objective)
 
 

@@ -80,7 +80,7 @@ def _solution(
         last_motion=motion,
         nlp=shooting.nlp,
         cost=shooting.cost,
-        cost_terms=prediction_terms(motion, costs, solver.gait.goals, solver.weights),
+        cost_terms=prediction_terms(motion, costs, solver.gait.costs, solver.weights),
         violations=shooting.violations,
         active=active_bounds(shooting.program, shooting.nlp),
         reintegration=errors,

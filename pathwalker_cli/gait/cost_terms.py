@@ -1,61 +1,88 @@
-"""The terms of the objective, evaluated on a motion: equations (8), (9), (10) and goals."""
+"""What a motion is worth: the terms of its objective, and every clinical goal."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES
-from pathwalker_cli.gait.goals import Goals
-from pathwalker_cli.gait.problem import EXCITATION, GaitProblem, GaitWeights
-from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.gait.costs import BASE, GOALS, Costs, Instant, Totals, Weights
+from pathwalker_cli.model.contact import phase_named
+from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 from pathwalker_cli.ocp.problem import Sample
 
-__all__ = ["cost_terms", "prediction_terms", "walked_distance"]
+__all__ = ["cost_terms", "goal_values", "prediction_terms", "walked_distance", "with_goal_costs"]
 
 
 def cost_terms(
-    motion: PhasedMotion, gait: GaitProblem, weights: GaitWeights, samples: tuple[Sample, ...] = ()
+    motion: PhasedMotion, costs: Costs, weights: Weights, samples: tuple[Sample, ...] = ()
 ) -> dict[str, float]:
     """Return the terms of the objective by name; they add up to the cost.
 
     Args:
-        motion: A whole stride.
-        gait: The problem that it solves.
-        weights: Weights of the terms.
+        motion: A whole stride of a problem with these costs.
+        costs: The terms.
+        weights: Their weights.
         samples: Recorded instants of a passage; without them the stride is a prediction.
     """
-    totals = dict(zip(gait.integrals, motion.phases[-1].integrals[-1], strict=True))
-    terms = prediction_terms(motion, totals, gait.goals, weights)
+    totals = dict(zip(costs.integrals, motion.phases[-1].integrals[-1], strict=True))
+    terms = prediction_terms(motion, totals, costs, weights)
     if samples:
-        terms["fit"] = weights.fit * squared_distance(motion, samples)
-        terms["excitation_regularisation"] = weights.excitation * float(totals[EXCITATION])
+        last = terms.pop("excitation_regularisation")
+        terms["fit"] = weights["fit"] * squared_distance(motion, samples)
+        terms["excitation_regularisation"] = last
     return terms
 
 
 def prediction_terms(
-    motion: PhasedMotion, costs: Mapping[str, float], goals: Goals, weights: GaitWeights
+    motion: PhasedMotion, integrals: Mapping[str, float], costs: Costs, weights: Weights
 ) -> dict[str, float]:
-    """Return the terms of equations (9) and (10) and those of clinical goals by name.
+    """Return the weighed terms by name, but for that of recorded instants.
 
     Args:
         motion: A whole stride.
-        costs: Integrals of the running costs over it by name, without weights.
-        goals: The goals that count.
-        weights: Weights of the terms.
+        integrals: Integrals of the running costs over it by name, without weights.
+        costs: The terms.
+        weights: Their weights.
     """
-    distance, time = walked_distance(motion), motion.duration
-    terms = {
-        "effort_per_distance": weights.effort * costs["effort"] / distance,
-        "rate_regularisation": weights.rate * costs["rate"] / distance,
-        "acceleration_regularisation": weights.acceleration * costs["acceleration"] / distance,
-        "walking_speed": -weights.walking_speed * distance / time,
-    }
-    durations = [phase.duration for phase in motion.phases]
-    for name, value in goals.values(costs, distance, time, durations).items():
-        terms[name] = weights.goals[name] * value
-    return {name: float(value) for name, value in terms.items()}
+    return costs.values(weights, _totals(motion, integrals))
+
+
+def goal_values(
+    motion: PhasedMotion, weight: float, comfort_ranges: Mapping[str, tuple[float, float]]
+) -> dict[str, float]:
+    """Return the value of every goal, without weights; of discomfort only if ranges are given.
+
+    Args:
+        motion: A whole stride.
+        weight: Body weight with what is worn [N].
+        comfort_ranges: Comfortable range by coordinate [rad].
+    """
+    names = tuple(name for name in GOALS if name != "discomfort" or comfort_ranges)
+    costs = Costs(names, comfort_ranges=comfort_ranges)
+    gains = sum(_goal_gains(phase, costs, weight).sum(axis=0) for phase in motion.phases)
+    integrals = [i for term in costs.goals.values() for i in term.integrals]
+    totals = _totals(motion, dict(zip(integrals, np.asarray(gains), strict=True)))
+    return {name: float(value) for name, value in costs.goal_values(totals).items()}
+
+
+def with_goal_costs(motion: PhasedMotion, costs: Costs, weight: float) -> PhasedMotion:
+    """Return a motion whose integrals are those of a problem with these goals.
+
+    Args:
+        motion: A motion of a problem with these or other goals.
+        costs: The terms of a prediction.
+        weight: Body weight with what is worn [N].
+    """
+    base = sum(len(term.integrals) for term in BASE.values())
+    phases, reached = [], np.zeros(len(costs.integrals) - base)
+    for phase in motion.phases:
+        gains = np.vstack([reached, _goal_gains(phase, costs, weight)]).cumsum(axis=0)
+        reached = gains[-1]
+        phases.append(replace(phase, integrals=np.hstack([phase.integrals[:, :base], gains])))
+    return replace(motion, phases=tuple(phases))
 
 
 def walked_distance(motion: PhasedMotion) -> float:
@@ -70,3 +97,22 @@ def squared_distance(motion: PhasedMotion, samples: tuple[Sample, ...]) -> float
         state = motion.phases[sample.phase].states_at(np.array([sample.fraction]))[0]
         total += float(np.sum((state[: len(COORDINATES)] - sample.data) ** 2))
     return total
+
+
+def _totals(motion: PhasedMotion, integrals: Mapping[str, float]) -> Totals:
+    durations = [phase.duration for phase in motion.phases]
+    return Totals(integrals, walked_distance(motion), motion.duration, durations)
+
+
+def _goal_gains(phase: PhaseMotion, costs: Costs, weight: float) -> np.ndarray:
+    """Return the integrals of the goals' running costs over every interval, shape (N, k)."""
+    contact, n = phase_named(phase.name), len(COORDINATES)
+    shape = phase.inner_states.shape[:2]
+    activation = phase.smooth_at(phase.point_fractions.ravel()).reshape(*shape, -1)
+    force = phase.algebraic[..., n : n + len(contact.indices)]
+    columns = phase.inner_states[..., :n], phase.inner_states[..., n:], activation, force
+    point = Instant(contact, *(list(np.moveaxis(values, -1, 0)) for values in columns))
+    running = costs.integrands(point, list(costs.numbers(weight)), costs.goals)
+    values = np.array([np.broadcast_to(cost, shape) for cost in running])
+    steps, weights = phase.duration * np.diff(phase.mesh), quadrature_weights(phase.degree)[1]
+    return np.asarray(np.einsum("kij,i,j->ik", values.reshape(-1, *shape), steps, weights))

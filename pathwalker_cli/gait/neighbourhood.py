@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig, with_values
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.kkt import Answer, KktSystem
@@ -131,8 +130,7 @@ class Neighbourhood:
 
     def _moved(self, values: Mapping[str, Any]) -> Optimum:
         """Return the optimum's unknowns in the program of other numbers."""
-        config: StudyConfig = with_values(self.optimum.config, values)
-        return self._resolver.restored(config, self.optimum.result)
+        return self._resolver.restored(self.optimum.case.with_values(values), self.optimum.result)
 
     def _derivative(
         self, answer: Answer, factor: float, step: float, ends: Mapping[int, Optimum]

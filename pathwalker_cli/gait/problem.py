@@ -9,7 +9,7 @@ controls their rates.  For fixed a, equation (2) increases strictly in the excit
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from functools import cached_property
 from typing import Final, Literal, cast
 
@@ -18,7 +18,14 @@ import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
 from pathwalker_cli.gait.boundary import gait_boundary
-from pathwalker_cli.gait.goals import Goals
+from pathwalker_cli.gait.costs import (
+    ACCELERATION_SIZE,
+    FORCE_SIZE,
+    RATE_SIZE,
+    Costs,
+    Instant,
+    Weights,
+)
 from pathwalker_cli.model.contact import FORCES, PHASES, ContactForce, ContactPhase
 from pathwalker_cli.model.elements import element_forces, generalised_forces
 from pathwalker_cli.model.elements.muscle import (
@@ -38,12 +45,8 @@ from pathwalker_cli.ocp.problem import (
 )
 
 __all__ = [
-    "EXCITATION",
-    "INTEGRALS",
-    "WEIGHTS",
     "Form",
     "GaitProblem",
-    "GaitWeights",
 ]
 
 VELOCITIES: Final = tuple(f"{name}_velocity" for name in COORDINATES)
@@ -51,78 +54,24 @@ ACCELERATIONS: Final = tuple(f"{name}_acceleration" for name in COORDINATES)
 RESERVES: Final = tuple(f"{name}_reserve" for name in COORDINATES)
 ACTIVATIONS: Final = tuple(f"{name}_activation" for name in GENERATORS)
 RATES: Final = tuple(f"{name}_rate" for name in GENERATORS)
-INTEGRALS: Final = ("effort", "rate", "acceleration", "tracking", "reserve")
-"""Running costs of every gait: the sums of a^2 (or a higher power), (rate / 20)^2, (vdot / 50)^2,
-(q - q_ref)^2 and (reserve / 20)^2."""
-EXCITATION: Final = "excitation"
-"""A further running cost of a passage: the sum of the squared excitations."""
-
 Form = Literal["stride", "step", "passage"]
 """A periodic stride of eight phases, one step of a symmetric gait, or a stride from a recording
 that need not be periodic."""
 
 # What counts as 1 for the solver; with these the prototypes needed the fewest iterations.
-_VELOCITY, _ACCELERATION, _FORCE, _TORQUE = 5.0, 50.0, 100.0, 20.0
-_RATE, _HEIGHT = 20.0, 0.1
-
-
-@dataclass(frozen=True)
-class GaitWeights:
-    """Weights of the cost terms.
-
-    Args:
-        effort: Weight of the effort per distance, equation (9).
-        rate: Weight of the squared activation rates per distance (regularisation).
-        acceleration: Weight of the squared accelerations per distance (regularisation).
-        walking_speed: lambda of equation (10).
-        tracking: Weight of the integral of (q - q_ref)^2.
-        reserve: Weight of the integral of the squared reserve forces.
-        smoothing: Weight of the integrals of squared activations and rates, not per distance.
-        fit: Weight of the sum over recorded instants of (q - q_recorded)^2, equation (8).
-        excitation: delta of equation (8), weight of the integral of the squared excitations.
-        goals: Weights of clinical goals by name.
-    """
-
-    effort: float = 1.0
-    rate: float = 1e-3
-    acceleration: float = 0.0
-    walking_speed: float = 0.0
-    tracking: float = 0.0
-    reserve: float = 0.0
-    smoothing: float = 0.0
-    fit: float = 0.0
-    excitation: float = 0.0
-    goals: Mapping[str, float] = field(default_factory=dict)
-
-    def vector(self, goals: Sequence[str] = ()) -> np.ndarray:
-        """Return the weights in the order of `WEIGHTS`, then those of these goals."""
-        own = [getattr(self, name) for name in WEIGHTS]
-        return np.array([*own, *(self.goals.get(name, 0.0) for name in goals)])
-
-
-WEIGHTS: Final = (
-    "effort",
-    "rate",
-    "acceleration",
-    "walking_speed",
-    "tracking",
-    "reserve",
-    "smoothing",
-    "fit",
-    "excitation",
-)
+_VELOCITY, _FORCE, _HEIGHT = 5.0, 100.0, 0.1
 
 
 class _Constants:
     """Symbols of the numbers that a patient and a config bring in, and their values."""
 
-    def __init__(self, walker: Walker, goals: Goals) -> None:
+    def __init__(self, walker: Walker, costs: Costs) -> None:
         body = walker.rigid_body
         self.theta = ca.SX.sym("theta", len(body.parameter_names))
         self.numbers = {number.address: ca.SX.sym(number.full_name) for number in walker.numbers}
         self.friction = ca.SX.sym("friction")
-        self.weights = ca.SX.sym("weights", len(WEIGHTS) + len(goals.names))
-        self.goal_numbers = ca.SX.sym("goal_numbers", goals.size)
+        self.weights = ca.SX.sym("weights", len(costs.weighed))
+        self.cost_numbers = ca.SX.sym("cost_numbers", costs.size)
         free = [unknown for unknown in walker.unknowns if walker.moves_bodies(unknown)]
         self.slopes = {u.name: ca.SX.sym(f"{u.name}_slope", self.theta.numel()) for u in free}
 
@@ -134,15 +83,15 @@ class _Constants:
             *self.numbers.values(),
             self.friction,
             self.weights,
-            self.goal_numbers,
+            self.cost_numbers,
             *self.slopes.values(),
         )
 
     def values(
         self,
         walker: Walker,
-        goals: Goals,
-        weights: GaitWeights,
+        costs: Costs,
+        weights: Weights,
         friction: float,
         share: float,
     ) -> np.ndarray:
@@ -157,8 +106,8 @@ class _Constants:
                 walker.rigid_body.parameters,
                 numbers,
                 [friction],
-                weights.vector(goals.names),
-                goals.numbers(walker.weight),
+                [weights.get(name, 0.0) for name in costs.weighed],
+                costs.numbers(walker.weight),
                 *(walker.body_slopes(free[name]) for name in self.slopes),
             ]
         )
@@ -191,21 +140,19 @@ class GaitProblem:
     Args:
         walker: The walker; its unknowns are the free parameters.
         form: What the phases are.
-        goals: Clinical goals, and the power of the effort.
+        costs: The terms of the objective.
     """
 
-    def __init__(self, walker: Walker, form: Form = "stride", goals: Goals | None = None) -> None:
+    def __init__(self, walker: Walker, form: Form = "stride", costs: Costs | None = None) -> None:
         self.walker = walker
         self.form = form
-        self.goals = goals or Goals()
+        self.costs = replace(costs or Costs(), passage=form == "passage")
         self.phases = PHASES[: len(PHASES) // 2] if form == "step" else PHASES
-        last = (EXCITATION,) if form == "passage" else ()
-        self.integrals = (*INTEGRALS, *self.goals.integrals, *last)
-        self.constants = _Constants(walker, self.goals)
+        self.constants = _Constants(walker, self.costs)
         scale = np.concatenate([np.ones(len(COORDINATES)), np.full(len(COORDINATES), _VELOCITY)])
         self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
         self.activations = Variables.make("a", ACTIVATIONS, 1.0)
-        self.rates = Variables.make("rate", RATES, _RATE)
+        self.rates = Variables.make("rate", RATES, RATE_SIZE)
         names = tuple(unknown.name for unknown in walker.unknowns)
         sizes = np.array([unknown.scale for unknown in walker.unknowns])
         self.parameters = Variables.make("parameters", names, sizes)
@@ -217,7 +164,7 @@ class GaitProblem:
         body = self.walker.rigid_body
         names, free = tuple(body.parameter_names), self.walker.unknowns
         parts = tuple((type(e).__name__, e.name) for e in self.walker.elements)
-        return self.form, body.backend, body.topology, names, parts, free, self.goals.structure
+        return self.form, body.backend, body.topology, names, parts, free, self.costs.structure
 
     @property
     def q(self) -> ca.SX:
@@ -239,8 +186,8 @@ class GaitProblem:
             parameters=self.parameters,
             shared=self.constants.vector,
             point_data=self.reference,
-            integrals=self.integrals,
-            integral_scale=np.ones(len(self.integrals)),
+            integrals=self.costs.integrals,
+            integral_scale=np.ones(len(self.costs.integrals)),
             phases=tuple(self._phase(*pair) for pair in zip(self.phases, following, strict=True)),
             node_rows=self._excitation_rows(),
             boundary=self._boundary(),
@@ -248,16 +195,16 @@ class GaitProblem:
         )
 
     def shared_values(
-        self, weights: GaitWeights, friction: float, orthosis_share: float = 1.0
+        self, weights: Weights, friction: float, orthosis_share: float = 1.0
     ) -> np.ndarray:
         """Return the numbers that go with `MultiPhaseProblem.shared`.
 
         Args:
-            weights: Weights of the cost terms.
+            weights: Weight of every cost term by name.
             friction: Coefficient of friction.
             orthosis_share: Share of the orthosis' fixed torques, below 1 to ease in a start.
         """
-        return self.constants.values(self.walker, self.goals, weights, friction, orthosis_share)
+        return self.constants.values(self.walker, self.costs, weights, friction, orthosis_share)
 
     @cached_property
     def _numbers(self) -> dict[str, ca.SX]:
@@ -299,7 +246,7 @@ class GaitProblem:
         body, theta = self.walker.rigid_body, self._theta
         names = ACCELERATIONS + contact.force_names + RESERVES
         counts = [len(ACCELERATIONS), len(contact.forces), len(RESERVES)]
-        scale = np.repeat([_ACCELERATION, _FORCE, _TORQUE], counts)
+        scale = np.repeat([ACCELERATION_SIZE, _FORCE, FORCE_SIZE], counts)
         z = Variables.make("z", names, scale)
         vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
         tau, frozen = self._torques
@@ -309,11 +256,11 @@ class GaitProblem:
         balance -= jacobian.T @ force
         motion = self._point_motion(vdot)
         residual = Rows.join(
-            Rows.make(balance, tuple(f"{n} equation of motion" for n in COORDINATES), _TORQUE),
+            Rows.make(balance, tuple(f"{n} equation of motion" for n in COORDINATES), FORCE_SIZE),
             Rows.make(
                 motion["acceleration"][active],
                 tuple(f"{n} contact acceleration" for n in contact.force_names),
-                _TORQUE,
+                FORCE_SIZE,
             ),
         )
         return Phase(
@@ -340,26 +287,21 @@ class GaitProblem:
     def _integrands(
         self, contact: ContactPhase, vdot: ca.SX, force: ca.SX, reserve: ca.SX
     ) -> ca.SX:
-        a, numbers = self.activations.symbol, ca.vertsplit(self.constants.goal_numbers)
-        q, v, activation, load = (ca.vertsplit(x) for x in (self.q, self.v, a, force))
-        terms = [
-            ca.sum1(a**self.goals.activation_power),
-            ca.sumsqr(self.rates.symbol / _RATE),
-            ca.sumsqr(vdot / _ACCELERATION),
-            ca.sumsqr(self.q - self.reference),
-            ca.sumsqr(reserve / _TORQUE),
-            *self.goals.integrands(contact, q, v, activation, load, numbers),
-        ]
-        if EXCITATION in self.integrals:
-            excitation = excitation_from_rate(self.rates.symbol, a)
-            terms.append(ca.sumsqr(excitation))
-        return ca.vertcat(*terms)
+        a, rate = self.activations.symbol, self.rates.symbol
+        columns = (self.q, self.v, a, force, rate, excitation_from_rate(rate, a), vdot, reserve)
+        point = Instant(contact, *(ca.vertsplit(x) for x in (*columns, self.reference)))
+        numbers = ca.vertsplit(self.constants.cost_numbers)
+        return ca.vertcat(*self.costs.integrands(point, numbers))
 
     def _sample(self) -> ca.SX:
         """Return the cost of one recorded instant of a passage."""
-        if self.form != "passage":
+        if not self.costs.passage:
             return ca.SX(0)
-        return self.constants.weights[WEIGHTS.index("fit")] * ca.sumsqr(self.q - self.reference)
+        return self._weights["fit"] * ca.sumsqr(self.q - self.reference)
+
+    @property
+    def _weights(self) -> dict[str, ca.SX]:
+        return dict(zip(self.costs.weighed, ca.vertsplit(self.constants.weights), strict=True))
 
     def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
         """Return heights of the points in the air and the friction cones of the loaded feet."""
@@ -403,7 +345,7 @@ class GaitProblem:
             Rows.make(
                 motion["acceleration"][index],
                 tuple(f"{f.name} touch-down force" for f in directions),
-                _TORQUE,
+                FORCE_SIZE,
             ),
         )
 
@@ -438,14 +380,11 @@ class GaitProblem:
         )
 
     def _boundary(self) -> Boundary:
-        names = (*WEIGHTS, *self.goals.names)
-        weights = dict(zip(names, ca.vertsplit(self.constants.weights), strict=True))
         return gait_boundary(
             (self.states, self.activations, self.rates),
             self.parameters,
-            self.integrals,
-            weights,
-            self.goals,
+            self.costs,
+            self._weights,
             len(self.phases),
             self.form == "step",
             self._standing() if self.form == "passage" else None,

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.gait.solve import GaitSolver
@@ -62,7 +63,7 @@ class Optimum:
     """A solved neighbour.
 
     Args:
-        solver: The solver of its config; it brings in walker, bounds and numbers.
+        solver: The solver of its case; it brings in walker, bounds and numbers.
         program: The nonlinear program.
         result: How the solve of it ended.
     """
@@ -72,9 +73,14 @@ class Optimum:
     result: NlpResult
 
     @property
+    def case(self) -> Case:
+        """What was asked for, and for whom."""
+        return self.solver.case
+
+    @property
     def config(self) -> StudyConfig:
         """What was asked for."""
-        return self.solver.config
+        return self.case.config
 
     @property
     def converged(self) -> bool:
@@ -140,7 +146,7 @@ class Resolver:
     """Solves problems near an optimum on its mesh; derivatives and solver are built once.
 
     Args:
-        config: The config of the optimum.
+        case: The case of the optimum.
         motion: Its motion.
         multipliers: Its multipliers; without them the optimum is solved anew from its motion.
         tolerance: Optimality tolerance of all solves; that of the config if left out.
@@ -148,13 +154,13 @@ class Resolver:
 
     def __init__(
         self,
-        config: StudyConfig,
+        case: Case,
         motion: PhasedMotion,
         multipliers: Multipliers | None = None,
         tolerance: float | None = None,
     ) -> None:
-        self._solver = GaitSolver(config)
-        self._tolerance = tolerance or config.solver.tolerance
+        self._solver = GaitSolver(case)
+        self._tolerance = tolerance or case.config.solver.tolerance
         steps = motion.phases[: len(self._solver.gait.phases)]
         self._motion = replace(motion, phases=steps)
         self._program = self._program_of(self._solver)
@@ -166,7 +172,7 @@ class Resolver:
     @classmethod
     def at(cls, optimum: Optimum, tolerance: float | None = None) -> Resolver:
         """Return a solver of the neighbours of an optimum."""
-        return cls(optimum.config, optimum.motion, optimum.result.multipliers, tolerance)
+        return cls(optimum.case, optimum.motion, optimum.result.multipliers, tolerance)
 
     @cached_property
     def optimum(self) -> Optimum:
@@ -179,13 +185,11 @@ class Resolver:
         )
         return Optimum(self._solver, self._program, result)
 
-    def resolve(
-        self, config: StudyConfig, start: Optimum | None = None, insist: bool = True
-    ) -> Optimum:
+    def resolve(self, case: Case, start: Optimum | None = None, insist: bool = True) -> Optimum:
         """Solve a neighbour.
 
         Args:
-            config: What differs; problem, model and degree must be those of the optimum.
+            case: What differs; problem, model and degree must be those of the optimum.
             start: Neighbour to begin with; the optimum if left out.
             insist: Whether to try without multipliers, which may take long, where these do not
                 lead to a solution.
@@ -194,7 +198,7 @@ class Resolver:
             Where the solve ended, converged or not.
         """
         start = start or self.optimum
-        solver = GaitSolver(config)
+        solver = GaitSolver(case)
         program = self._program_of(solver)
         unknowns, multipliers = start.result.unknowns, start.result.multipliers
         result = self._warm(warm_start_for(program, unknowns)).solve(program, unknowns, multipliers)
@@ -202,9 +206,9 @@ class Resolver:
             result = self._cold.solve(program, unknowns)
         return Optimum(solver, program, result)
 
-    def restored(self, config: StudyConfig, result: NlpResult) -> Optimum:
+    def restored(self, case: Case, result: NlpResult) -> Optimum:
         """Return a neighbour that was solved before."""
-        solver = GaitSolver(config)
+        solver = GaitSolver(case)
         return Optimum(solver, self._program_of(solver), result)
 
     def _program_of(self, solver: GaitSolver) -> CollocationProgram:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
+from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.gait.bounds import GaitBounds
@@ -85,7 +86,7 @@ class GaitSolution:
     A solution that did not converge is sealed: `series` raises; `last_iterate` says what it is.
 
     Args:
-        config: What was asked for.
+        case: What was asked for, and for whom.
         walker: Who walks.
         status: "converged" or the reason why not.
         last_motion: The last iterate.
@@ -103,7 +104,7 @@ class GaitSolution:
         shortfall: Why no motion was found, where that was looked for.
     """
 
-    config: StudyConfig
+    case: Case
     walker: Walker
     status: str
     last_motion: PhasedMotion
@@ -119,6 +120,11 @@ class GaitSolution:
     seconds: dict[str, float]
     optima: tuple[LocalOptimum, ...] = ()
     shortfall: Shortfall | None = None
+
+    @property
+    def config(self) -> StudyConfig:
+        """What was asked for."""
+        return self.case.config
 
     @property
     def converged(self) -> bool:

@@ -9,7 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.case import Case
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
     gait_bounds,
@@ -17,17 +18,16 @@ from pathwalker_cli.gait.bounds import (
     recorded_durations,
     tracking_bounds,
 )
-from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.goal_costs import with_goal_costs
+from pathwalker_cli.gait.cost_terms import cost_terms, with_goal_costs
+from pathwalker_cli.gait.costs import Weights
 from pathwalker_cli.gait.passage import passage_samples, recorded_passage
-from pathwalker_cli.gait.problem import Form, GaitProblem, GaitWeights
+from pathwalker_cli.gait.problem import Form, GaitProblem
 from pathwalker_cli.gait.shortfall import Shortfall, missing_torques
 from pathwalker_cli.gait.solution import TOO_WEAK, GaitSolution, StageRecord
 from pathwalker_cli.gait.start import ReferenceStride, reference_stride, start_recording
 from pathwalker_cli.gait.structures import gait_blocks
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
 from pathwalker_cli.model.numbers import Unknown
-from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
 from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -40,16 +40,16 @@ from pathwalker_cli.stride.verify import Reintegration, reintegrate
 
 __all__ = ["GaitSolver", "solve_study"]
 
-_TRACKING = GaitWeights(effort=0.0, rate=0.0, tracking=10.0, reserve=10.0, smoothing=0.1)
+_TRACKING = {"tracking": 10.0, "reserve": 10.0, "smoothing": 0.1}
 """Weights of the first stage: follow the stride, carried by reserve forces where needed."""
 
 _TRACKING_TOLERANCE, _TRACKING_BARRIER = 1e-2, 0.1
 """A start need not be exact; far from any solution a large barrier takes the fewest iterations."""
 
-_HELPED = GaitWeights(effort=1e-2, rate=2e-4, acceleration=1e-5, reserve=10.0)
+_HELPED = {"effort": 1e-2, "rate": 2e-4, "acceleration": 1e-5, "reserve": 10.0}
 """Weights by which reserves at the joints help a solve that failed: hardly any effort matters."""
 
-_LEAST_HELP = replace(_HELPED, reserve=1e3)
+_LEAST_HELP = {**_HELPED, "reserve": 1e3}
 """Weights of the least help: what is left of the reserves is what the muscles lack."""
 
 _PATIENCE = 400
@@ -76,11 +76,11 @@ class GaitSolver:
     """One problem structure, built once; solves it on any mesh with any numbers.
 
     Args:
-        config: The study.
+        case: What is solved, and for whom.
         observer: Called after every iteration with the stage's name.
     """
 
-    config: StudyConfig
+    case: Case
     observer: StageObserver | None = None
     stages: list[StageRecord] = field(default_factory=list)
     seconds: dict[str, float] = field(
@@ -91,13 +91,8 @@ class GaitSolver:
     def __post_init__(self) -> None:
         """Build walker, bounds and the blocks of the problem."""
         began = time.perf_counter()
-        patient = study_patient(self.config)
-        model = self.config.model
-        free = self.config.free
-        self.walker = build_walker(
-            patient, self.config.condition, model.published, model.backend, tuple(free)
-        )
-        self.bounds = gait_bounds(self.walker, self.config.bounds, free)
+        self.walker = self.case.walker(self.config.model.backend)
+        self.bounds = gait_bounds(self.walker, self.config.bounds, self.config.free)
         self.gait = GaitProblem(self.walker, self._form(), self.config.cost.wanted)
         if self.config.start.gait == "recorded":
             _ = self.stride  # a missing recording is refused before anything is built
@@ -105,6 +100,11 @@ class GaitSolver:
             self.bounds = recorded_durations(self.bounds, self.stride.durations)
         self.blocks = gait_blocks(self.gait, self.config.mesh.degree)
         self.seconds["build"] += time.perf_counter() - began
+
+    @property
+    def config(self) -> StudyConfig:
+        """What is solved."""
+        return self.case.config
 
     def _form(self) -> Form:
         """Return what the phases are.
@@ -120,18 +120,18 @@ class GaitSolver:
         return "step"
 
     @property
-    def weights(self) -> GaitWeights:
-        """Cost weights of the prediction."""
+    def weights(self) -> dict[str, float]:
+        """Weights of the prediction by cost term."""
         cost = self.config.cost
-        return GaitWeights(
-            effort=cost.effort_weight,
-            rate=cost.rate_weight,
-            acceleration=cost.acceleration_weight,
-            walking_speed=cost.walking_speed_weight,
-            fit=cost.fit_weight,
-            excitation=cost.excitation_weight,
-            goals=cost.goals,
-        )
+        return {
+            "effort": cost.effort_weight,
+            "rate": cost.rate_weight,
+            "acceleration": cost.acceleration_weight,
+            "walking_speed": cost.walking_speed_weight,
+            "fit": cost.fit_weight,
+            "excitation": cost.excitation_weight,
+            **cost.goals,
+        }
 
     @property
     def free(self) -> tuple[Unknown, ...]:
@@ -169,7 +169,7 @@ class GaitSolver:
         return np.clip(values, lower, upper)
 
     def numbers(
-        self, weights: GaitWeights, table: BoundTable, orthosis_share: float = 1.0
+        self, weights: Weights, table: BoundTable, orthosis_share: float = 1.0
     ) -> ProblemNumbers:
         """Return the numbers of a stage."""
         friction = self.config.bounds.friction
@@ -246,7 +246,7 @@ class GaitSolver:
         else:
             warm_start = replace(warm_start, phases=warm_start.phases[: len(self.gait.phases)])
             if not config.fits:
-                warm_start = with_goal_costs(warm_start, self.gait.goals, self.walker.weight)
+                warm_start = with_goal_costs(warm_start, self.gait.costs, self.walker.weight)
             kept = config.mesh.refinements > 0
             motion = warm_start if kept else self._first_meshed(warm_start)
             settings = self.settings(loose or solver.tolerance, solver.warm_barrier)
@@ -315,7 +315,7 @@ class GaitSolver:
             self.bounds, stride.durations, dict(zip(names, held.tolist(), strict=True))
         )
         meshes = meshing.first(stride.durations[: len(self.gait.phases)], config.mesh)
-        costs = len(self.gait.integrals)
+        costs = len(self.gait.costs.integrals)
         motion = stride.motion(self.walker, held, meshes, config.mesh.degree, costs)
         settings = self.settings(_TRACKING_TOLERANCE, _TRACKING_BARRIER)
         settings = replace(settings, extra={"barrier_tol_factor": 100.0, **settings.extra})
@@ -386,14 +386,14 @@ class GaitSolver:
         motion = program.to_motion(result.unknowns)
         motion = full_stride(motion) if self.config.half_cycle else motion
         return GaitSolution(
-            config=self.config,
+            case=self.case,
             walker=self.walker.with_parameters(motion.parameters),
             status=status,
             last_motion=motion,
             nlp=result,
             bounds=self.bounds,
             cost=result.objective,
-            cost_terms=cost_terms(motion, self.gait, self.weights, self.samples),
+            cost_terms=cost_terms(motion, self.gait.costs, self.weights, self.samples),
             violations=largest_violations(program, result),
             active=active_bounds(program, result),
             reintegration=errors,
@@ -409,9 +409,9 @@ def _within(errors: Reintegration, tolerances: tuple[float, float]) -> bool:
 
 
 def solve_study(
-    config: StudyConfig,
+    study: StudyConfig | Case,
     warm_start: PhasedMotion | None = None,
     observer: StageObserver | None = None,
 ) -> GaitSolution:
-    """Build and solve a study; see `GaitSolver`."""
-    return GaitSolver(config, observer).solve(warm_start)
+    """Build and solve a study, whose patient is read if it is a config; see `GaitSolver`."""
+    return GaitSolver(Case.of(study), observer).solve(warm_start)

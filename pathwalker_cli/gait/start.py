@@ -11,9 +11,8 @@ from scipy.interpolate import CubicSpline
 from pathwalker_cli.config import StartConfig
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, GRAVITY
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.gait.problem import INTEGRALS
 from pathwalker_cli.gait.stylised import StylisedGait, stylised_trajectory
-from pathwalker_cli.io.recordings import CompactRecording, read_recording, recording_names
+from pathwalker_cli.io.recordings import CompactRecording, read_recording, start_names
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times
@@ -72,7 +71,7 @@ class ReferenceStride:
         parameters: np.ndarray,
         meshes: tuple[np.ndarray, ...],
         degree: int,
-        integrals: int = len(INTEGRALS),
+        integrals: int,
     ) -> PhasedMotion:
         """Return a start on a mesh: this stride, level activations, weight on the feet.
 
@@ -137,7 +136,7 @@ def start_recording(walker: Walker, config: StartConfig) -> CompactRecording:
     Raises:
         DataError: If there is none.
     """
-    names = recording_names(walker.patient, config.condition)
+    names = start_names(walker.patient, config.condition)
     trial = config.trial or _first_with_stride(walker, config, names)
     return read_recording(walker.patient, config.condition, trial)
 

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from scipy.stats import qmc
 
-from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.case import Case
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, StageRecord
@@ -45,13 +45,13 @@ class _Outcome:
     shortfall: Shortfall | None
 
 
-def spread_starts(config: StudyConfig, solver: GaitSolver) -> list[StudyConfig]:
-    """Return a study for every start; equal seeds give equal starts.
+def spread_starts(solver: GaitSolver) -> list[Case]:
+    """Return a case for every start; equal seeds give equal starts.
 
     Args:
-        config: The study; `starts` says how many.
-        solver: Its solver, which knows the range of speed and stiffnesses.
+        solver: The solver of the study, whose `starts` says how many.
     """
+    config = solver.config
     single = config.model_copy(update={"starts": 1})
     unknowns = solver.walker.unknowns
     lower, upper = solver.bounds.table.arrays(tuple(unknown.name for unknown in unknowns))
@@ -73,21 +73,21 @@ def spread_starts(config: StudyConfig, solver: GaitSolver) -> list[StudyConfig]:
             }
         )
         studies.append(single.model_copy(update={"start": start}))
-    return studies
+    return [replace(solver.case, config=study) for study in studies]
 
 
-def solve_from_starts(config: StudyConfig, finished: Finished | None = None) -> GaitSolution:
+def solve_from_starts(case: Case, finished: Finished | None = None) -> GaitSolution:
     """Solve a study from all its starts, on as many processes as there are cores.
 
     Args:
-        config: The study.
+        case: The study.
         finished: Called with every local optimum as soon as it is there.
 
     Returns:
         The best solution, with all local optima ordered by cost.
     """
-    solver = GaitSolver(config)
-    outcomes = list(_outcomes(spread_starts(config, solver), finished))
+    solver = GaitSolver(case)
+    outcomes = list(_outcomes(spread_starts(solver), finished))
     outcomes.sort(key=lambda o: (not o.optimum.converged, o.optimum.cost, o.optimum.start))
     best = outcomes[0]
     solver.stages, solver.seconds = list(best.stages), dict(best.seconds)
@@ -97,18 +97,18 @@ def solve_from_starts(config: StudyConfig, finished: Finished | None = None) -> 
     return replace(solution, optima=optima, start=best.optimum.description)
 
 
-def _outcomes(studies: list[StudyConfig], finished: Finished | None) -> Iterator[_Outcome]:
+def _outcomes(cases: list[Case], finished: Finished | None) -> Iterator[_Outcome]:
     """Yield the outcomes of all starts as they come."""
-    workers = min(len(studies), len(os.sched_getaffinity(0)))
-    for outcome in called_elsewhere(_solved, list(enumerate(studies)), workers):
+    workers = min(len(cases), len(os.sched_getaffinity(0)))
+    for outcome in called_elsewhere(_solved, list(enumerate(cases)), workers):
         if finished is not None:
             finished(outcome.optimum)
         yield outcome
 
 
-def _solved(number: int, study: StudyConfig) -> _Outcome:
+def _solved(number: int, case: Case) -> _Outcome:
     """Solve one start in a process of its own."""
-    solver = GaitSolver(study)
+    solver = GaitSolver(case)
     solution = solver.solve()
     last = solution.last_motion
     optimum = LocalOptimum(

@@ -22,6 +22,7 @@ __all__ = [
     "read_compact",
     "read_recording",
     "recording_names",
+    "start_names",
     "write_recording",
 ]
 
@@ -74,8 +75,13 @@ def write_recording(folder: str | Path, recording: CompactRecording) -> None:
 
 
 def recording_names(patient: Patient, condition: Condition) -> tuple[str, ...]:
-    """Return the names of the trials that stand beside a patient's file."""
-    return names_in(_folder(patient, condition))
+    """Return the names of a patient's trials."""
+    return tuple(sorted({n for folder in _folders(patient, condition) for n in names_in(folder)}))
+
+
+def start_names(patient: Patient, condition: Condition) -> tuple[str, ...]:
+    """Return the names of the trials that a search may begin with: what a run keeps, it keeps."""
+    return next(filter(None, map(names_in, _folders(patient, condition))), ())
 
 
 def names_in(folder: Path) -> tuple[str, ...]:
@@ -84,19 +90,19 @@ def names_in(folder: Path) -> tuple[str, ...]:
 
 
 def read_recording(patient: Patient, condition: Condition, name: str) -> CompactRecording:
-    """Read one trial that stands beside a patient's file.
+    """Read one trial of a patient.
 
     Raises:
         DataError: If there is no such trial, or a file of it cannot be used.
     """
-    names = recording_names(patient, condition)
-    if name not in names:
-        raise DataError(
-            f"patient {patient.id} has no {condition} recording '{name}'",
-            allowed=", ".join(names) or "none are there",
-            mend="import C3D files first",
-        )
-    return read_compact(_folder(patient, condition), name)
+    for folder in _folders(patient, condition):
+        if name in names_in(folder):
+            return read_compact(folder, name)
+    raise DataError(
+        f"patient {patient.id} has no {condition} recording '{name}'",
+        allowed=", ".join(recording_names(patient, condition)) or "none are there",
+        mend="import C3D files first",
+    )
 
 
 def read_compact(folder: Path, name: str) -> CompactRecording:
@@ -134,11 +140,9 @@ def _read_table(path: Path, columns: Mapping[str, str], missing: bool = False) -
     return table
 
 
-def _folder(patient: Patient, condition: Condition) -> Path:
-    """Return the folder of a condition's recordings."""
-    if patient.folder is None:
-        raise DataError(f"patient {patient.id} was not read from a file")
-    return patient.folder / "recordings" / condition
+def _folders(patient: Patient, condition: Condition) -> list[Path]:
+    """Return the folders of a condition's recordings, those that count first before others."""
+    return [folder / condition for folder in patient.recordings]
 
 
 def _read_events(path: Path, frames: int) -> tuple[Event, ...]:

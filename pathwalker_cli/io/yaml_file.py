@@ -16,7 +16,16 @@ from pathwalker_cli.errors import ConfigError, InputError
 from pathwalker_cli.io.refusals import KeyPath, Lines, dotted, place, sentence
 from pathwalker_cli.io.special import refuse_special
 
-__all__ = ["KeyPath", "Lines", "load_yaml", "read_mapping", "validate", "yaml_text"]
+__all__ = [
+    "KeyPath",
+    "Lines",
+    "load_yaml",
+    "mapping_in",
+    "read_mapping",
+    "read_text",
+    "validate",
+    "yaml_text",
+]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -73,7 +82,14 @@ def read_mapping(
         InputError: Of class `error`, if the file is missing, is not YAML, repeats a key, or holds
             anything but a mapping of names to values.
     """
-    content, lines = _content(_text(Path(path), error), str(path), error)
+    return mapping_in(read_text(path, error), path, error)
+
+
+def mapping_in(
+    text: str, path: str | Path, error: type[InputError] = ConfigError
+) -> tuple[dict[str, Any], Lines]:
+    """Return the mapping in the text of a YAML file; see `read_mapping`."""
+    content, lines = _content(text, str(path), error)
     if not isinstance(content, dict):
         found = "nothing" if content is None else f"a {type(content).__name__}"
         raise error(f"holds {found}", where=str(path), allowed="keys with values ('key: value')")
@@ -150,8 +166,13 @@ def validate(
         raise sentence(problem, mapping, model_class, where, error, lines or {}) from None
 
 
-def _text(path: Path, error: type[InputError]) -> str:
-    """Return the text of a file."""
+def read_text(path: str | Path, error: type[InputError] = ConfigError) -> str:
+    """Return the text of a file.
+
+    Raises:
+        InputError: Of class `error`, if it is missing, too large or no text.
+    """
+    path = Path(path)
     refuse_special(path, error)
     try:
         with path.open("rb") as file:

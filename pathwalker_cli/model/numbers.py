@@ -35,6 +35,8 @@ class Number:
         label: The name for people, e.g. "neutral angle".
         unit: SI unit.
         side: The side that it belongs to.
+        default: Its value where the patient's file gives none; None where it has to.
+        source: Where the default comes from.
         faded: Whether the first stage of a solve lets only a share of it act: torques that would
             fight a stride that knows nothing of them.
     """
@@ -44,6 +46,8 @@ class Number:
     label: str
     unit: str
     side: Side | None = None
+    default: float | None = None
+    source: str = ""
     faded: bool = False
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
@@ -24,9 +24,11 @@ from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 
-__all__ = ["Walker", "build_walker"]
+__all__ = ["Walker", "build_walker", "unknowns_of"]
 
-_GENERATORS: Final = generators()
+_MUSCLES: Final = generators()
+_TISSUE: Final[tuple[ForceElement, ...]] = ()
+"""Force elements of every body beside the muscles."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class Walker:
         model: Rigid bodies in Pinocchio.
         rigid_body: The same as CasADi functions.
         muscles: The muscle torque generators.
+        tissue: Force elements of the body beside the muscles.
         device: What is worn.
         values: Every named number by address [SI].
         unknowns: The numbers that a problem is free to choose.
@@ -52,6 +55,7 @@ class Walker:
     model: pin.Model
     rigid_body: RigidBodyFunctions
     muscles: tuple[MuscleTorqueGenerator, ...]
+    tissue: tuple[ForceElement, ...]
     device: Device
     values: Mapping[str, float]
     unknowns: tuple[Unknown, ...] = ()
@@ -64,8 +68,14 @@ class Walker:
 
     @cached_property
     def elements(self) -> tuple[ForceElement, ...]:
-        """All force elements: muscles, then what the device adds."""
-        return (*self.muscles, *self.device.forces)
+        """All force elements: muscles, other tissue, then what the device adds."""
+        return (*self.muscles, *self.tissue, *self.device.forces)
+
+    def columns(self, elements: Iterable[ForceElement]) -> list[int]:
+        """Return where the forces of some elements stand among those of all."""
+        names = {element.name for element in elements}
+        owners = [element.name for element in self.elements for _ in element.coordinates]
+        return [i for i, owner in enumerate(owners) if owner in names]
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
@@ -202,7 +212,7 @@ class Walker:
             _vector(v, n, "v"),
             _vector(activation, m, "activation"),
         )
-        return self.element_forces(q, v, activation)[:m]
+        return self.element_forces(q, v, activation)[self.columns(self.muscles)]
 
     def orthosis_torques(self, q: Any, k_d: Any, k_p: Any) -> np.ndarray:
         """Return the torques of the orthoses on the ankles.
@@ -224,8 +234,8 @@ class Walker:
             for side, *pair in pairs
             for number, value in zip(self.device.elements[side].numbers[:2], pair, strict=True)
         }
-        muscles = np.zeros(len(self.muscles))
-        return self.with_values(springs).element_forces(q, rest, muscles)[len(muscles) :]
+        forces = self.with_values(springs).element_forces(q, rest, np.zeros(len(self.muscles)))
+        return forces[self.columns(self.device.forces)]
 
     def joint_torques(self, muscle: Any, orthosis: Any = (0.0, 0.0)) -> np.ndarray:
         """Return generalised forces of the actuators [N m], shape (10,); zero at the root.
@@ -236,9 +246,11 @@ class Walker:
         """
         muscle = _vector(muscle, len(self.muscles), "muscle")
         orthosis = _vector(orthosis, 2, "orthosis")
-        return self.generalised_forces(
-            np.concatenate([muscle, orthosis[: len(self.device.forces)]])
-        )
+        forces = np.zeros(sum(len(element.coordinates) for element in self.elements))
+        forces[self.columns(self.muscles)] = muscle
+        if self.device.worn:
+            forces[self.columns(self.device.forces)] = orthosis
+        return self.generalised_forces(forces)
 
     def contact_dynamics(
         self, phase: str | int | ContactPhase, q: Any, v: Any, tau: Any
@@ -369,18 +381,19 @@ def build_walker(
     if device.worn:
         patient.require_orthosis()
     model = pinocchio_model(patient, condition, published)
-    numbers = _numbers((*_GENERATORS, *device.forces), device)
-    values = {number.address: patient.number(number.address) for number in numbers}
+    numbers = _numbers((*_MUSCLES, *_TISSUE, *device.forces), device)
+    values = {n.address: patient.number(n.address, n.default) for n in numbers}
     return Walker(
         patient=patient,
         condition=condition,
         skeleton=PLANAR_WALKER,
         model=model,
         rigid_body=rigid_body_functions(model, CONTACT_POINTS, backend),
-        muscles=_GENERATORS,
+        muscles=_MUSCLES,
+        tissue=_TISSUE,
         device=device,
         values=values,
-        unknowns=_unknowns(device, numbers, free),
+        unknowns=unknowns_of(condition, free),
         published=published,
     )
 
@@ -391,14 +404,21 @@ def _numbers(elements: Sequence[ForceElement], device: Device) -> tuple[Number, 
     return (*of_elements, *device.added_mass.values())
 
 
-def _unknowns(
-    device: Device, numbers: Sequence[Number], free: Sequence[str]
-) -> tuple[Unknown, ...]:
+def unknowns_of(condition: Condition, free: Sequence[str] = ()) -> tuple[Unknown, ...]:
     """Return what a problem chooses: what is asked for, and what a device is there to be found for.
 
     What a device is identified for stands first, per kind right before left, unless both sides
     alike are asked for.
+
+    Args:
+        condition: "barefoot" or "orthosis".
+        free: Addresses of numbers that are asked for.
+
+    Raises:
+        ConfigError: If there is no such number.
     """
+    device = DEVICES[condition]
+    numbers = _numbers((*_MUSCLES, *_TISSUE, *device.forces), device)
     asked = unknowns_at(free, numbers)
     taken = {address for unknown in asked for address in unknown.addresses}
     usual = [

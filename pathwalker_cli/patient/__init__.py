@@ -10,6 +10,7 @@ from pathwalker_cli.patient.file import (
     SegmentLengths,
     Strengths,
     load_patient,
+    recordings_beside,
     shipped_patients,
 )
 
@@ -23,5 +24,6 @@ __all__ = [
     "SegmentLengths",
     "Strengths",
     "load_patient",
+    "recordings_beside",
     "shipped_patients",
 ]

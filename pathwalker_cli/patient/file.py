@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,7 +17,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from pathwalker_cli.conventions import SIDES, Condition
 from pathwalker_cli.errors import PatientError, did_you_mean
 from pathwalker_cli.io.fields import Quantity, Sides, YamlModel, invalid
-from pathwalker_cli.io.yaml_file import load_yaml, read_mapping, validate
+from pathwalker_cli.io.yaml_file import mapping_in, read_text, validate
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient.blocks import (
     ContactPoints,
@@ -43,6 +44,7 @@ __all__ = [
     "SegmentLengths",
     "Strengths",
     "load_patient",
+    "recordings_beside",
     "shipped_patients",
 ]
 
@@ -53,6 +55,21 @@ JENSEN_AGES = Quantity(
     "Jensen's fits start at boys of 4 years: choose age_for_regressions",
     "Jensen's fits end at boys of 15 years: choose age_for_regressions (is it in months?)",
 )
+
+
+@dataclass(frozen=True)
+class _Origin:
+    """Where a patient comes from.
+
+    Args:
+        source: The file; None of a patient that was not read.
+        content: The bytes that were read: the file, and that of the orthosis if it is apart.
+        recordings: Folders of recordings, a folder in each per condition; earlier ones count first.
+    """
+
+    source: Path | None = None
+    content: bytes = b""
+    recordings: tuple[Path, ...] = ()
 
 
 class Patient(YamlModel):
@@ -71,8 +88,10 @@ class Patient(YamlModel):
     strengths: Strengths | None = None
     orthosis: OrthosisData | None = None
     recorded: dict[Condition, Recorded] = Field(default_factory=dict)
-    _source: Path | None = PrivateAttr(default=None)
-    _orthosis_source: Path | None = PrivateAttr(default=None)
+    numbers: dict[str, Annotated[float, Quantity("SI units", -1e4, 1e4)]] = Field(
+        default_factory=dict
+    )
+    _origin: _Origin = PrivateAttr(default=_Origin())
     _changes: tuple[str, ...] = PrivateAttr(default=())
 
     @field_validator("id")
@@ -105,21 +124,25 @@ class Patient(YamlModel):
             )
         return self
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel to other processes as JSON: the classes of pairs of sides have no name there."""
+        content = self.model_dump_json(exclude_none=True)
+        return _travelled, (content, self._origin, self._changes)
+
     @property
     def source(self) -> Path | None:
         """The file this was read from."""
-        return self._source
+        return self._origin.source
 
     @property
     def content(self) -> bytes:
         """The bytes that this was read from: the file, and that of the orthosis if it is apart."""
-        files = (self._source, self._orthosis_source)
-        return b"".join(file.read_bytes() for file in files if file is not None)
+        return self._origin.content
 
     @property
-    def folder(self) -> Path | None:
-        """The folder of that file; recordings stand in its `recordings`."""
-        return self._source.parent if self._source else None
+    def recordings(self) -> tuple[Path, ...]:
+        """Folders of recordings, a folder in each per condition; earlier ones count first."""
+        return self._origin.recordings
 
     @property
     def regression_age(self) -> float:
@@ -147,12 +170,22 @@ class Patient(YamlModel):
             raise self._lacks("orthosis", "add it, or choose the barefoot condition")
         return self.orthosis
 
-    def number(self, address: str) -> float:
+    def number(self, address: str, default: float | None = None) -> float:
         """Return the number at a place in the file, e.g. "orthosis.neutral_angle.right".
 
+        What has no key of its own stands under its whole address in `numbers`.
+
+        Args:
+            address: The place, the side last where there is one.
+            default: What counts where the file gives none.
+
         Raises:
-            PatientError: If the file gives none there.
+            PatientError: If the file gives none there, and there is no default.
         """
+        place = address.rpartition(".")[0] if address.endswith(SIDES) else address
+        given = self.numbers.get(address, self.numbers.get(place, default))
+        if given is not None:
+            return given
         holder: Any = self
         for part in address.split("."):
             if isinstance(holder, int | float):  # one number for both sides
@@ -231,8 +264,15 @@ class Patient(YamlModel):
         return (*notes, *self._changes)
 
     def _lacks(self, key: str, mend: str) -> PatientError:
-        where = str(self._source) if self._source else f"patient {self.id}"
+        where = str(self.source) if self.source else f"patient {self.id}"
         return PatientError(f"{key} is not given", where=where, mend=mend)
+
+
+def _travelled(content: str, origin: _Origin, changes: tuple[str, ...]) -> Patient:
+    """Return a patient that comes from another process."""
+    patient = Patient.model_validate_json(content, strict=True)
+    patient._origin, patient._changes = origin, changes
+    return patient
 
 
 def shipped_patients() -> tuple[str, ...]:
@@ -240,26 +280,40 @@ def shipped_patients() -> tuple[str, ...]:
     return tuple(sorted(p.parent.name for p in shipped("patient_data").glob("*/patient.yaml")))
 
 
-def load_patient(id_or_path: str | Path) -> Patient:
+def load_patient(id_or_path: str | Path, recordings: tuple[Path, ...] = ()) -> Patient:
     """Read a patient.
 
     Args:
         id_or_path: A shipped id, a folder with `patient.yaml`, or a YAML file.  Its `orthosis` may
             be the path of a file of its own, relative to the patient's.
+        recordings: Folders of further recordings than those beside the file.
 
     Raises:
         PatientError: If there is no such patient or its file is refused.
     """
     path = _patient_file(id_or_path)
-    mapping, lines = read_mapping(path, PatientError)
-    worn, apart = mapping.get("orthosis"), None
-    if isinstance(worn, str):
+    text = read_text(path, PatientError)
+    mapping, lines = mapping_in(text, path, PatientError)
+    if isinstance(worn := mapping.get("orthosis"), str):
         apart = path.parent / worn
-        orthosis = load_yaml(apart, OrthosisData, PatientError)
+        more = read_text(apart, PatientError)
+        content, places = mapping_in(more, apart, PatientError)
+        orthosis = validate(
+            content, OrthosisData, where=str(apart), error=PatientError, lines=places
+        )
         mapping = {**mapping, "orthosis": orthosis.model_dump(mode="json", exclude_none=True)}
+        text += more
     patient = validate(mapping, Patient, where=str(path), error=PatientError, lines=lines)
-    patient._source, patient._orthosis_source = path, apart
+    patient._origin = _Origin(path, text.encode(), (path.parent / "recordings", *recordings))
     return patient
+
+
+def recordings_beside(id_or_path: str | Path) -> Path:
+    """Return the folder of recordings beside a patient's file, whether or not either is there."""
+    if str(id_or_path) in shipped_patients():
+        return shipped("patient_data") / str(id_or_path) / "recordings"
+    path = Path(id_or_path)
+    return (path if os.path.isdir(path) else path.parent) / "recordings"
 
 
 def _patient_file(id_or_path: str | Path) -> Path:

@@ -74,7 +74,7 @@ def varied(patient: Patient, variation: Variation) -> Patient:
     )
     notes = [f"{place} x {factor:g}" for place, factor in variation.scale.items()]
     notes += [f"{place} {amount:+g}" for place, amount in variation.shift.items()]
-    changed._source, changed._orthosis_source = patient._source, patient._orthosis_source
+    changed._origin = patient._origin
     changed._changes = (f"differs from the patient's file: {', '.join(notes)}",)
     return changed
 

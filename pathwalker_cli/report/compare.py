@@ -12,9 +12,8 @@ from typing import Any, Final
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.config.values import differing_values
 from pathwalker_cli.evaluation.run import gaits_of_runs
-from pathwalker_cli.gait.goals import GOALS
+from pathwalker_cli.gait.costs import GOALS
 from pathwalker_cli.io.table import write_table
-from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.measure import FORCE, LOADS, Measure
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.stride.stride import Stride
@@ -128,8 +127,7 @@ def compare_runs(folders: Sequence[Path]) -> Comparison:
     Raises:
         DataError: If a run is named twice, did not converge or cannot be used.
     """
-    gaits = gaits_of_runs(folders)
-    runs = [load_run(folder) for folder in folders]
+    runs, gaits = zip(*gaits_of_runs(folders), strict=True)
     found = (
         Compared(
             measure,

@@ -116,8 +116,8 @@ def _warnings(runs: Sequence[ReportRun]) -> list[str]:
             )
         if run.patient_changed:
             found.append(
-                f"{run.label}: the patient's file is no longer that of the run; age, mass, height "
-                "and forces per weight are those of today's file"
+                f"{run.label}: the patient's file is no longer that of the run; this page is about "
+                "the patient of the run"
             )
     return found
 

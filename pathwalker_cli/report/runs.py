@@ -9,13 +9,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.config import study_patient
-from pathwalker_cli.errors import DataError
+from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
-from pathwalker_cli.evaluation.run import gait_of_run
+from pathwalker_cli.evaluation.run import run_and_gait
 from pathwalker_cli.patient import Patient, load_patient
-from pathwalker_cli.results.metrics import patient_hash
-from pathwalker_cli.results.run_folder import PATIENT, Run, load_run
+from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.verdict import Verdict, verdict_of_metrics
 
 __all__ = ["ReportRun", "changes_of", "read_runs"]
@@ -28,16 +26,19 @@ class ReportRun:
     Args:
         label: What to call it: its condition, or its folder where several share that.
         run: Its folder as it was read.
-        patient: The patient as the file says today.
         evaluation: Its gait beside the recordings.
         verdict: What is known about its springs; None where nothing was judged.
     """
 
     label: str
     run: Run
-    patient: Patient
     evaluation: Evaluation
     verdict: Verdict | None
+
+    @property
+    def patient(self) -> Patient:
+        """The patient, with the variation of the config."""
+        return self.run.case.patient
 
     @property
     def worn(self) -> bool:
@@ -57,14 +58,14 @@ class ReportRun:
     def patient_changed(self) -> bool:
         """Whether the patient's file says something else of this run's condition than it did.
 
-        Barefoot, the orthosis does not matter.  Runs that kept no patient are told by their hash.
+        Barefoot, the orthosis does not matter.  A file that cannot be read says nothing.
         """
-        kept = self.run.folder / PATIENT
-        if kept.is_file():
-            then, today = load_patient(kept), load_patient(self.run.config.patient)
-            return _of_condition(then, self.worn) != _of_condition(today, self.worn)
-        read = self.run.metrics.get("input_hashes", {}).get("patient")
-        return read is not None and read != patient_hash(self.patient)
+        try:
+            today = load_patient(self.run.config.patient)
+        except InputError:
+            return False
+        then = self.run.case.unvaried
+        return _of_condition(then, self.worn) != _of_condition(today, self.worn)
 
 
 def read_runs(folders: Sequence[Path]) -> tuple[ReportRun, ...]:
@@ -73,8 +74,8 @@ def read_runs(folders: Sequence[Path]) -> tuple[ReportRun, ...]:
     Raises:
         DataError: If one did not converge, cannot be read, or they are of different patients.
     """
-    gaits = [gait_of_run(folder) for folder in folders]
-    runs = [load_run(folder) for folder in folders]
+    both = [run_and_gait(folder, folder.resolve().name) for folder in folders]
+    runs, gaits = zip(*both, strict=True)
     ids = [gait.walker.patient.id for gait in gaits]
     for folder, each in zip(folders, ids, strict=True):
         if each != ids[0]:
@@ -88,12 +89,9 @@ def read_runs(folders: Sequence[Path]) -> tuple[ReportRun, ...]:
     unique = len(set(conditions)) == len(conditions)
     names = conditions if unique else _labels(folders)
     found = [
-        ReportRun(
-            name, run, study_patient(run.config), evaluate_gait(gait),
-            verdict_of_metrics(run.metrics),
-        )
+        ReportRun(name, run, evaluate_gait(gait), verdict_of_metrics(run.metrics))
         for name, run, gait in zip(names, runs, gaits, strict=True)
-    ]  # fmt: skip
+    ]
     return tuple(sorted(found, key=lambda each: each.worn))
 
 

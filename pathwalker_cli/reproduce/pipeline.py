@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.case import Case
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.reproduce.figures import save_paper_figures
 from pathwalker_cli.reproduce.inverse_study import (
@@ -20,7 +20,7 @@ from pathwalker_cli.reproduce.inverse_study import (
 from pathwalker_cli.reproduce.page import page_text
 from pathwalker_cli.reproduce.plan import check_folder, planned_studies
 from pathwalker_cli.reproduce.results import Results, evaluated, recordings
-from pathwalker_cli.studies.run import is_done
+from pathwalker_cli.studies.run import done_run
 from pathwalker_cli.versions import versions
 
 __all__ = ["PAGE", "Say", "Solve", "reproduce"]
@@ -28,7 +28,7 @@ __all__ = ["PAGE", "Say", "Solve", "reproduce"]
 PAGE = "results.md"
 """File of the page."""
 
-Solve = Callable[[StudyConfig, Path], None]
+Solve = Callable[[Case, Path], None]
 """Solves a study and writes its run folder, converged or not."""
 Say = Callable[[str], None]
 """Called with one line per step."""
@@ -84,17 +84,15 @@ def _inverse(folder: Path, c3d: Path | None, say: Say) -> dict[str, InverseResul
     return found
 
 
-def _solved(
-    folder: Path, studies: Mapping[str, StudyConfig], solve: Solve, say: Say
-) -> dict[str, bool]:
+def _solved(folder: Path, studies: Mapping[str, Case], solve: Solve, say: Say) -> dict[str, bool]:
     """Solve the problems that are not solved yet; return which were."""
     kept = {}
     for name, study in studies.items():
         began, place = time.perf_counter(), folder / name
-        kept[name] = is_done(place, study)
+        kept[name] = done_run(place, study) is not None
         if not kept[name]:
             solve(study, place)
-        done = kept[name] or is_done(place, study)
+        done = kept[name] or done_run(place, study) is not None
         state = "was there" if kept[name] else "converged" if done else "did not converge"
         say(_line(name, state, began))
     return kept

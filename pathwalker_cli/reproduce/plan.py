@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from pathwalker_cli.config import StudyConfig, load_config, smoke_version
+from pathwalker_cli.case import Case, load_case
+from pathwalker_cli.config import smoke_version
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.results.run_folder import check_target
 from pathwalker_cli.studies.base import check_folder as check_own_folder
@@ -28,19 +30,21 @@ ENTRIES: Final = frozenset({"results.md", "figures", "inverse-dynamics", "runs"}
 """Everything that the folder holds; one with anything else is never written into."""
 
 
-def planned_studies(starts: int, quick: bool) -> dict[str, StudyConfig]:
+def planned_studies(starts: int, quick: bool) -> dict[str, Case]:
     """Return the study of every problem, as shipped.
 
     Args:
         starts: Starts of the problems `SEVERAL`.
         quick: Whether coarse meshes without refinement and one start will do.
     """
-    studies = {problem: load_config(problem, problem) for problem in ORDER}
+    cases = {problem: load_case(problem, problem) for problem in ORDER}
     if quick:
-        return {problem: smoke_version(study) for problem, study in studies.items()}
+        return {
+            name: replace(case, config=smoke_version(case.config)) for name, case in cases.items()
+        }
     return {
-        problem: study.model_copy(update={"starts": starts}) if problem in SEVERAL else study
-        for problem, study in studies.items()
+        problem: case.with_values({"starts": starts}) if problem in SEVERAL else case
+        for problem, case in cases.items()
     }
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.paper import PATIENT
@@ -107,10 +107,8 @@ def evaluated(
     result = ProblemResult(config.problem, metrics, run.result.bounds, config, kept)
     if metrics["status"] != "converged":
         return result
-    patient = study_patient(config)
-    walker = build_walker(patient, config.condition, config.model.published)
-    series = gait_series(walker, run.motion)
+    series = gait_series(run.case.walker(), run.motion)
     gait = stride_of(series, config.problem, config.problem)
-    theirs = recorded.get(config.condition) if patient.id == PATIENT else None
+    theirs = recorded.get(config.condition) if run.case.patient.id == PATIENT else None
     evaluation = evaluate_gait(gait, recorded=theirs)
     return replace(result, series=series, evaluation=evaluation)

@@ -12,14 +12,13 @@ from typing import Any, Final
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.gait.goal_costs import goal_values
+from pathwalker_cli.gait.cost_terms import goal_values
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.json_file import json_text
-from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.nlp.kernels import kernels_level
 from pathwalker_cli.ocp.violations import ActiveBound
-from pathwalker_cli.patient import Patient
 from pathwalker_cli.stride.balance import balance
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.stride import stride_of
@@ -31,7 +30,6 @@ __all__ = [
     "RunInputs",
     "RunMetrics",
     "metrics_hash",
-    "patient_hash",
     "run_inputs",
     "run_metrics",
     "sha256",
@@ -116,17 +114,15 @@ class RunMetrics(BaseModel):
 
 @dataclass(frozen=True)
 class RunInputs:
-    """What a run was made from, taken before the solve: files may change while it lasts.
+    """What a run was made from, taken before the solve: an earlier run may change meanwhile.
 
     Args:
         hashes: SHA-256 of the resolved config, of the patient's file, of what is kept of the
             patient, and of an earlier motion.
-        patient: The patient as YAML in one piece.
         warm_start: Run that it began with; "" without one.
     """
 
     hashes: Mapping[str, str]
-    patient: str
     warm_start: str = ""
 
 
@@ -135,29 +131,20 @@ def sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def run_inputs(
-    config_text: str, patient: Patient, warm_start: str | Path | None = None
-) -> RunInputs:
+def run_inputs(case: Case, warm_start: str | Path | None = None) -> RunInputs:
     """Return what a run is made from.
 
     Args:
-        config_text: The resolved config as text.
-        patient: The patient, without variation.
+        case: What is solved, and for whom.
         warm_start: Folder of the run to begin with.
     """
-    content = patient.model_dump(mode="json", exclude_none=True)
-    kept = yaml_text(content, "The patient of this run, before any variation of the config.")
-    hashes = {"config": sha256(config_text.encode()), "patient_kept": sha256(kept.encode())}
-    if (read := patient_hash(patient)) is not None:
-        hashes["patient"] = read
+    kept = {"config": config_text(case.config), "patient_kept": case.patient_text}
+    hashes = {name: sha256(text.encode()) for name, text in kept.items()}
+    if case.content_hash is not None:
+        hashes["patient"] = case.content_hash
     if warm_start is not None:
         hashes["warm_start"] = sha256((Path(warm_start) / "motion.npz").read_bytes())
-    return RunInputs(hashes, kept, "" if warm_start is None else str(warm_start))
-
-
-def patient_hash(patient: Patient) -> str | None:
-    """Return the SHA-256 of the file that a patient was read from; None if there is none."""
-    return None if patient.source is None else sha256(patient.content)
+    return RunInputs(hashes, "" if warm_start is None else str(warm_start))
 
 
 def stiffness_ranges(solution: GaitSolution) -> dict[str, tuple[float, float]]:

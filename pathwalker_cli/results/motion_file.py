@@ -14,7 +14,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.gait.problem import INTEGRALS
+from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.io.special import refuse_special
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.nlp.ipopt import Multipliers
@@ -168,7 +168,7 @@ def _shapes(phase: PhaseMotion) -> dict[str, tuple[int, ...]]:
     inner = phase.inner_states.shape
     degree = inner[1] if len(inner) == 3 else 1
     width = phase.integrals.shape[-1] if phase.integrals.ndim else 0
-    costs = max(width, len(INTEGRALS))  # goals and fits add some
+    costs = max(width, len(Costs().integrals))  # goals and fits add some
     forces = len(phase_named(phase.name).indices)
     return {
         "mesh": (nodes,),

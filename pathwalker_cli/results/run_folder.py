@@ -15,8 +15,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import StudyConfig, load_config
-from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.gait.start import start_recording
@@ -25,9 +25,11 @@ from pathwalker_cli.io.atomic import check_room, swapped, sweep
 from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.recordings import write_recording
-from pathwalker_cli.io.yaml_file import validate, yaml_text
+from pathwalker_cli.io.yaml_file import validate
+from pathwalker_cli.model.walker import unknowns_of
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.patient import load_patient, recordings_beside
 from pathwalker_cli.results.metrics import (
     RUN_FORMAT,
     RunInputs,
@@ -54,11 +56,9 @@ __all__ = [
     "Run",
     "check_target",
     "claimed_run",
-    "config_text",
     "default_folder",
     "load_run",
     "release_runs",
-    "repeatable_config",
     "warm_start_run",
     "write_run",
 ]
@@ -66,7 +66,7 @@ __all__ = [
 CONFIG: Final = "config.resolved.yaml"
 """The config of a run with every value written out."""
 PATIENT: Final = "patient.yaml"
-"""The patient of a run, so that the folder is enough to verify and to repeat it."""
+"""The patient of a run: whatever stands on the run takes this one, not the file of today."""
 _METRICS, _MOTION, _RECORDINGS = "metrics.json", "motion.npz", "recordings"
 _MULTIPLIERS: Final = "multipliers.npz"
 _SEAL: Final = "NOT_CONVERGED.txt"
@@ -86,14 +86,14 @@ class Run:
         folder: Where it stands.
         metrics: Content of `metrics.json`, by key.
         motion: The exact motion.
-        config: The config with all defaults filled in.
+        case: The config with all defaults filled in, and the patient that the folder keeps.
         multipliers: Multipliers of the solution by collocation; None if they were not kept.
     """
 
     folder: Path
     metrics: dict[str, Any]
     motion: PhasedMotion
-    config: StudyConfig
+    case: Case
     multipliers: Multipliers | None = None
 
     @cached_property
@@ -101,10 +101,10 @@ class Run:
         """The same metrics, typed."""
         return RunMetrics.model_validate(self.metrics)
 
-
-def config_text(config: StudyConfig) -> str:
-    """Return a config with all defaults filled in, as YAML that `load_config` reads."""
-    return yaml_text(config.model_dump(mode="json"), "The config of this run, every value written.")
+    @property
+    def config(self) -> StudyConfig:
+        """The config with all defaults filled in."""
+        return self.case.config
 
 
 def default_folder(config: StudyConfig, patient: str) -> Path:
@@ -138,12 +138,12 @@ def write_run(
     Raises:
         DataError: If the folder holds something else, or cannot be written.
     """
-    text = config_text(solution.config)
-    inputs = inputs or run_inputs(text, solution.walker.patient)
+    case = solution.case
+    inputs = inputs or run_inputs(case)
     result = run_metrics(solution, inputs, more)
     with _staged(Path(folder)) as staging:
-        (staging / CONFIG).write_text(text, encoding="utf-8")
-        (staging / PATIENT).write_text(inputs.patient, encoding="utf-8")
+        (staging / CONFIG).write_text(config_text(case.config), encoding="utf-8")
+        (staging / PATIENT).write_text(case.patient_text, encoding="utf-8")
         _keep_recording(staging, solution)
         (staging / "log.txt").write_text("".join(f"{line}\n" for line in log), encoding="utf-8")
         write_motion(staging / _MOTION, solution.last_motion)
@@ -310,19 +310,23 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
     if (folder / _MULTIPLIERS).exists():
         multipliers = read_multipliers(folder / _MULTIPLIERS)
         _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
-    config = load_config(_file(folder, CONFIG))
-    expected = len(STIFFNESSES) if config.condition == "orthosis" else 0
+    case = _kept_case(folder)
+    config = case.config
+    expected = len(unknowns_of(config.condition, tuple(config.free)))
     if config.problem != metrics["problem"] or motion.parameters.size != expected:
         where = str(folder / CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)
-    return Run(folder, metrics, motion, config, multipliers)
+    return Run(folder, metrics, motion, case, multipliers)
 
 
-def repeatable_config(run: Run) -> StudyConfig:
-    """Return the config of a run for the patient that its folder keeps, if it keeps one."""
-    kept = run.folder / PATIENT
-    patient = str(kept.resolve()) if kept.is_file() else run.config.patient
-    return run.config.model_copy(update={"patient": patient})
+def _kept_case(folder: Path) -> Case:
+    """Return what was solved, and for whom; recordings that are not kept stand where they did."""
+    config = load_config(_file(folder, CONFIG))
+    if not (folder / PATIENT).is_file():
+        raise DataError(f"keeps no {PATIENT}: it is damaged or of an older version",
+                        where=str(folder), mend="solve again")  # fmt: skip
+    patient = load_patient(folder / PATIENT, (recordings_beside(config.patient),))
+    return Case(config, patient)
 
 
 def _check_hash(path: Path, expected: str | None) -> None:

@@ -146,8 +146,9 @@ class _Powers:
 
 
 def _powers(series: GaitSeries, states: list[_State]) -> _Powers:
-    powers, muscles = series.element_power, len(series.walker.muscles)
-    each, worn = powers[:, :muscles], powers[:, muscles:]
+    powers, walker = series.element_power, series.walker
+    each = powers[:, walker.columns((*walker.muscles, *walker.tissue))]
+    worn = powers[:, walker.columns(walker.device.forces)]
     return _Powers(
         muscle=each.sum(axis=1),
         orthosis=worn.sum(axis=1),

@@ -104,10 +104,10 @@ def _peak_moments(stride: Stride, scale: float = 1.0) -> dict[str, float]:
 
 
 def _work(stride: Stride, muscles: bool, sign: float) -> float:
-    """Return what muscles or the others did (+) or took up (-), each for itself [J]."""
-    count = len(stride.walker.muscles)
-    elements = slice(count) if muscles else slice(count, None)
-    power = stride.known("element_power")[:, elements]
+    """Return what muscles or orthoses did (+) or took up (-), each for itself [J]."""
+    walker = stride.walker
+    columns = walker.columns(walker.muscles if muscles else walker.device.forces)
+    power = stride.known("element_power")[:, columns]
     return sign * float(stride.weights @ np.maximum(sign * power, 0.0).sum(axis=1))
 
 

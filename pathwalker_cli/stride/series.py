@@ -53,19 +53,17 @@ class GaitSeries:
         """Neural excitations in [0, 1], shape (n, 14), from equation (2)."""
         return excitation_from_rate(self.activation_rate, self.activation)
 
-    @property
+    @cached_property
     def muscle_torque(self) -> np.ndarray:
         """Torque of each muscle torque generator [N m], shape (n, 14)."""
-        return self.element_force[:, : len(self.walker.muscles)]
+        return self.element_force[:, self.walker.columns(self.walker.muscles)]
 
-    @property
+    @cached_property
     def orthosis_torque(self) -> np.ndarray:
         """Torques of the orthoses right, left [N m], shape (n, 2); zero when barefoot."""
         if not self.walker.device.worn:
             return np.zeros((len(self.time), len(SIDES)))
-        names = [element.name for element in self.walker.elements]
-        orthoses = [self.walker.device.elements[side].name for side in SIDES]
-        return self.element_force[:, [names.index(name) for name in orthoses]]
+        return self.element_force[:, self.walker.columns(self.walker.device.forces)]
 
     @property
     def stiffness(self) -> np.ndarray:

@@ -82,7 +82,7 @@ class Stride:
         net_torque: Sum of muscle and orthosis torques per coordinate [N m], shape (n, 10).
         muscle_torque: Torque of each generator [N m], shape (n, 14).
         orthosis_torque: Torques of the orthoses right, left [N m], shape (n, 2).
-        element_power: Powers of all force elements, muscles first [W], shape (n, k).
+        element_power: Powers in the order of `walker.elements` [W], shape (n, k).
         activation: Activation of each generator, shape (n, 14).
         quadrature: Weights of an integral over time [s], shape (n,); trapezoids if left out.
         stiffness: K_D right, left, K_P right, left [N m/rad], shape (4,).

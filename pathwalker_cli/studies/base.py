@@ -10,23 +10,19 @@ from typing import Any, TypeVar
 
 from pydantic import Field
 
-from pathwalker_cli.config import (
-    StudyConfig,
-    load_config,
-    place_of,
-    read_config,
-    with_values,
-)
+from pathwalker_cli.case import Case
+from pathwalker_cli.config import load_config, place_of, read_config, with_values
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.io.atomic import check_room, sweep
 from pathwalker_cli.io.fields import YamlModel
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.results.run_folder import Run, load_run
-from pathwalker_cli.studies.run import RunLog, is_done, run_study
+from pathwalker_cli.studies.run import RunLog, done_run, run_study
 
 __all__ = [
     "NeighbourStudy",
+    "base_case",
     "base_run",
     "check_folder",
     "claimed_folder",
@@ -70,35 +66,38 @@ def load_study(path: str | Path, model: type[Study], changes: tuple[str, ...] = 
     )
 
 
-def base_config(study: NeighbourStudy) -> StudyConfig:
-    """Return the config of the problem that a study is about.
+def base_case(study: NeighbourStudy) -> Case:
+    """Return the problem that a study is about, and its patient.
 
     Raises:
         ConfigError: If there is no such config, or it is wrong.
+        PatientError: If there is no such patient, or its file is refused.
     """
-    return with_values(load_config(study.base), study.set, f"set of the study on {study.base}")
+    config = load_config(study.base)
+    return Case.of(with_values(config, study.set, f"set of the study on {study.base}"))
 
 
-def base_run(study: StudyConfig, folder: Path, log: RunLog | None = None) -> Run:
-    """Return the converged run of a study in a folder; it is solved unless it is there.
+def base_run(case: Case, folder: Path, log: RunLog | None = None) -> Run:
+    """Return the converged run of a case in a folder; it is solved unless it is there.
 
     Raises:
         NotConvergedError: If it does not converge: there is nothing to stand on then.
         DataError: If the folder holds something else.
     """
-    if not is_done(folder, study):
-        solution = run_study(study, folder, log=log).solution
+    run = done_run(folder, case)
+    if run is None:
+        solution = run_study(case, folder, log=log).solution
         if not solution.converged:
             raise NotConvergedError(
-                f"{study.problem}, on which the study stands, did not converge: "
+                f"{case.config.problem}, on which the study stands, did not converge: "
                 f"{solution.status}; its last iterate is in {folder}"
             )
-    return load_run(folder)
+    return run or load_run(folder)
 
 
 def resolver_of(run: Run, tolerance: float | None = None) -> Resolver:
     """Return a solver of the neighbours of a run."""
-    return Resolver(run.config, run.motion, run.multipliers, tolerance)
+    return Resolver(run.case, run.motion, run.multipliers, tolerance)
 
 
 def require_optimum(resolver: Resolver, run: Run, tolerance: float) -> Optimum:

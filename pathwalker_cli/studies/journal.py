@@ -8,14 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig, study_patient
+from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
 from pathwalker_cli.results.metrics import sha256
 from pathwalker_cli.results.motion_file import read_arrays
-from pathwalker_cli.results.run_folder import Run, config_text
+from pathwalker_cli.results.run_folder import Run
 
 __all__ = ["STOPPED", "Journal"]
 
@@ -37,28 +37,27 @@ class Journal:
     def __init__(self, folder: Path, run: Run, resolver: Resolver) -> None:
         self.folder = folder
         self.resolver = resolver
-        patient = sha256(study_patient(run.config).content)
-        self._origin = f"{run.metrics['motion_hash']} {patient}"
+        self._origin = f"{run.metrics['motion_hash']} {run.case.content_hash}"
         self.solved = 0
         """Neighbours that were solved by this journal, not read."""
 
-    def resolve(self, name: str, config: StudyConfig, start: Optimum | None = None) -> Optimum:
+    def resolve(self, name: str, case: Case, start: Optimum | None = None) -> Optimum:
         """Return a solved neighbour, read or solved now; see `Resolver.resolve`.
 
         Args:
             name: Name of its file, unique in the study.
-            config: Its config.
+            case: Its case.
             start: Neighbour to begin with.
 
         Raises:
             NotConvergedError: If the user stopped it: nothing further is wanted then.
         """
-        seal = sha256(f"{self._origin} {config_text(config)}".encode())
+        seal = sha256(f"{self._origin} {config_text(case.config)}".encode())
         path = self.folder / f"{name}.npz"
         result = _read(path, seal)
         if result is not None:
-            return self.resolver.restored(config, result)
-        optimum = self.resolver.resolve(config, start)
+            return self.resolver.restored(case, result)
+        optimum = self.resolver.resolve(case, start)
         self.solved += 1
         if optimum.result.status == "stopped by the user":
             raise NotConvergedError(STOPPED)

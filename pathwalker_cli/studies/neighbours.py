@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.case import Case
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.resolve import Optimum
@@ -42,17 +42,17 @@ class Neighbours:
                             allowed="a run by collocation")  # fmt: skip
         self.run = run
         self._tell = tell
-        limited = with_values(run.config, {"solver.max_iterations": max_iterations})
-        resolver = resolver_of(replace(run, config=limited))
+        limited = run.case.with_values({"solver.max_iterations": max_iterations})
+        resolver = resolver_of(replace(run, case=limited))
         self._journal = Journal(folder, run, resolver)
-        self.optimum = require_optimum(resolver, run, limited.solver.tolerance)
+        self.optimum = require_optimum(resolver, run, limited.config.solver.tolerance)
         """The run as an optimum, solved to its tolerance."""
         self._count = 0
 
-    def resolve(self, name: str, config: StudyConfig, start: Optimum | None) -> Optimum:
+    def resolve(self, name: str, case: Case, start: Optimum | None) -> Optimum:
         """Return a neighbour, read or solved now; see `Journal.resolve`."""
         solved = self._journal.solved
-        found = self._journal.resolve(name, config, start)
+        found = self._journal.resolve(name, case, start)
         self._count += 1
         result = found.result
         how = f"{result.iterations} iterations, {result.seconds:.1f} s"
@@ -61,13 +61,13 @@ class Neighbours:
         self._tell(f"{self._count:4d}  {name:<24} {outcome}, {how}")
         return found
 
-    def solver(self, config_at: Callable[[Values], StudyConfig]) -> Solve[Optimum]:
+    def solver(self, case_at: Callable[[Values], Case]) -> Solve[Optimum]:
         """Return what solves the points of a graph.
 
         Args:
-            config_at: Returns the config of the values of a point.
+            case_at: Returns the case of the values of a point.
         """
-        return lambda name, values, start: self.resolve(name, config_at(values), start)
+        return lambda name, values, start: self.resolve(name, case_at(values), start)
 
 
 def motion_distance(one: Optimum, other: Optimum) -> float:

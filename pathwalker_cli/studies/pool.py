@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.case import Case
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.io.processes import called_elsewhere, prepare_worker
-from pathwalker_cli.results.run_folder import load_run
+from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import resolver_of
 from pathwalker_cli.studies.journal import STOPPED, Journal
 from pathwalker_cli.studies.measures import measures
@@ -24,11 +24,11 @@ class Job:
 
     Args:
         name: Its name in the journal.
-        config: Its config.
+        case: Its case.
     """
 
     name: str
-    config: StudyConfig
+    case: Case
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Solved:
 
 def solve_jobs(
     jobs: Sequence[Job],
-    run: Path,
+    run: Run,
     folder: Path,
     tolerance: float,
     workers: int,
@@ -66,7 +66,7 @@ def solve_jobs(
 
     Args:
         jobs: What to solve.
-        run: Folder of the run.
+        run: The run.
         folder: Folder of the journal.
         tolerance: Optimality tolerance.
         workers: Processes; with one, this process does it.
@@ -82,19 +82,19 @@ def solve_jobs(
         yield solved
 
 
-_Origin = tuple[Path, Path, float]
-"""Folders of run and journal, and the tolerance."""
+_Origin = tuple[Run, Path, float]
+"""Run, folder of the journal, and the tolerance."""
 
 
 def _journal(origin: _Origin) -> Journal:
-    run = load_run(origin[0])
-    return Journal(origin[1], run, resolver_of(run, origin[2]))
+    run, folder, tolerance = origin
+    return Journal(folder, run, resolver_of(run, tolerance))
 
 
 def _solved(journal: Journal, job: Job) -> Solved:
     """Solve one neighbour."""
     before = journal.solved
-    optimum = journal.resolve(job.name, job.config)
+    optimum = journal.resolve(job.name, job.case)
     values = measures(optimum) if optimum.converged else {}
     result = optimum.result
     kept = journal.solved == before

@@ -7,17 +7,16 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pathwalker_cli.config import StudyConfig, study_patient
-from pathwalker_cli.errors import DataError, InputError
+from pathwalker_cli.case import Case, config_text
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.errors import DataError, InputError, NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp.watch import ProgressReport
-from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results.metrics import RunInputs, patient_hash, run_inputs
+from pathwalker_cli.results.metrics import RunInputs, run_inputs
 from pathwalker_cli.results.run_folder import (
     Run,
     check_target,
-    config_text,
     load_run,
     warm_start_run,
     write_run,
@@ -25,7 +24,7 @@ from pathwalker_cli.results.run_folder import (
 from pathwalker_cli.studies.verdict import Verdict, verdict_of
 from pathwalker_cli.studies.verdict_text import verdict_lines
 
-__all__ = ["Outcome", "RunLog", "is_done", "run_study"]
+__all__ = ["Outcome", "RunLog", "done_run", "run_study"]
 
 
 class Outcome(NamedTuple):
@@ -66,12 +65,15 @@ class RunLog:
 
 
 def run_study(
-    study: StudyConfig, folder: Path, warm_start: Path | None = None, log: RunLog | None = None
+    study: StudyConfig | Case,
+    folder: Path,
+    warm_start: Path | None = None,
+    log: RunLog | None = None,
 ) -> Outcome:
     """Solve a study, judge its springs, and write its run folder.
 
     Args:
-        study: The study.
+        study: The study; the patient of a config is read now.
         folder: The run folder; an earlier run in it is replaced.
         warm_start: Folder of an earlier run to begin with.
         log: Is told of every iteration.
@@ -80,12 +82,12 @@ def run_study(
         DataError: If the folder holds something else, or the earlier run cannot be used; if the
             folder cannot be written in the end, the run is in a temporary one that is named.
     """
-    log = log or RunLog()
+    log, case = log or RunLog(), Case.of(study)
     check_target(folder)
-    earlier = None if warm_start is None else warm_start_run(warm_start, study)
-    inputs = run_inputs(config_text(study), load_patient(study.patient), warm_start)
-    solution = _solve(study, earlier, log)
-    verdict = verdict_of(solution) if study.verdict else None
+    earlier = None if warm_start is None else warm_start_run(warm_start, case.config)
+    inputs = run_inputs(case, warm_start)
+    solution = _solve(case, earlier, log)
+    verdict = verdict_of(solution) if case.config.verdict else None
     lines = [*_log_lines(solution, inputs, log), *_verdict_lines(verdict)]
     more = {"verdict": None if verdict is None else verdict.as_dict()}
     try:
@@ -107,36 +109,33 @@ def _kept_elsewhere(name: str, *run: Any) -> Path | None:
     return place
 
 
-def is_done(folder: Path, study: StudyConfig) -> bool:
-    """Return whether a folder holds a converged run of just this study.
+def done_run(folder: Path, case: Case) -> Run | None:
+    """Return the converged run of just this case that a folder holds.
 
-    A run that is damaged, did not converge, or was made from another config or patient file
-    is not done.
+    None if it is damaged, did not converge, or was made from another config or patient's file.
     """
     try:
-        run = load_run(folder, allow_unconverged=True)
-        same = config_text(run.config) == config_text(study)
-    except InputError:
-        return False
-    now = patient_hash(study_patient(study))
+        run = load_run(folder)
+    except (InputError, NotConvergedError):
+        return None
+    same = config_text(run.config) == config_text(case.config)
     then = run.metrics.get("input_hashes", {}).get("patient")
-    sealed = (folder / "NOT_CONVERGED.txt").exists()
-    return same and run.metrics["status"] == "converged" and now == then and not sealed
+    return run if same and then == case.content_hash else None
 
 
-def _solve(study: StudyConfig, earlier: Run | None, log: RunLog) -> GaitSolution:
+def _solve(case: Case, earlier: Run | None, log: RunLog) -> GaitSolution:
     """Solve a study, from an earlier run if there is one."""
     motion = None if earlier is None else earlier.motion
     # what few solves need is loaded where it is needed: the others begin 0.4 s sooner
-    if study.transcription == "multiple-shooting":
+    if case.config.transcription == "multiple-shooting":
         from pathwalker_cli.gait.by_shooting import solve_by_shooting
 
-        return solve_by_shooting(GaitSolver(study, log), motion)
-    if study.starts > 1 and motion is None:
+        return solve_by_shooting(GaitSolver(case, log), motion)
+    if case.config.starts > 1 and motion is None:
         from pathwalker_cli.gait.starts import solve_from_starts
 
-        return solve_from_starts(study, log.optimum)
-    return GaitSolver(study, log).solve(motion)
+        return solve_from_starts(case, log.optimum)
+    return GaitSolver(case, log).solve(motion)
 
 
 def _verdict_lines(verdict: Verdict | None) -> list[str]:

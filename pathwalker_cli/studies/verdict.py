@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.bounds import held
@@ -197,7 +197,7 @@ def verdict_of(solution: GaitSolution) -> Verdict | None:
     if config.half_cycle or config.transcription != "collocation":
         return None
     began = time.perf_counter()
-    resolver = Resolver(config, solution.last_motion, solution.nlp.multipliers)
+    resolver = Resolver(solution.case, solution.last_motion, solution.nlp.multipliers)
     judge = _Judge(resolver)
     if not judge.around.free or not judge.optimum.converged:
         return None
@@ -341,8 +341,8 @@ class _Judge:
         self, values: Mapping[Unknown, float], start: Optimum | None = None, insist: bool = True
     ) -> Optimum:
         """Return the neighbour with some numbers prescribed."""
-        config = with_values(self.config, held(self.config, values))
-        return self.resolver.resolve(config, start, insist)
+        case = self.optimum.case.with_values(held(self.config, values))
+        return self.resolver.resolve(case, start, insist)
 
     def snapped(self) -> SnappedSprings | None:
         """Return the best choice among the springs that exist, solved again."""

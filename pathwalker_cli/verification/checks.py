@@ -11,17 +11,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.goal_costs import goal_values
+from pathwalker_cli.gait.cost_terms import cost_terms, goal_values
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.special import refuse_special
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.results.metrics import METRICS_HASH, metrics_hash, sha256
-from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run, repeatable_config
+from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.stride.balance import balance
 from pathwalker_cli.stride.measures import metrics_of
@@ -111,17 +109,16 @@ def verify_run(folder: str | Path) -> Verification:
         NotConvergedError: If the run did not converge.
     """
     run = load_run(folder)
-    config = repeatable_config(run)
-    solver = GaitSolver(config)
+    solver = GaitSolver(run.case)
     series = gait_series(solver.walker, run.motion)
     numbers = metrics_of(stride_of(series))
     checks = (
         *_files(run, series),
         *_numbers(run, solver, numbers),
-        *_dynamics(run, config, series, numbers),
+        *_dynamics(run, series, numbers),
         *_solution(run, solver),
     )
-    return Verification(Path(folder), config.problem, solver.walker.patient.id, checks)
+    return Verification(Path(folder), run.config.problem, solver.walker.patient.id, checks)
 
 
 def _files(run: Run, series: GaitSeries) -> Iterator[Check]:
@@ -196,7 +193,7 @@ def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
     made = dict(numbers)
     if run.config.transcription == "collocation":
-        terms = cost_terms(run.motion, solver.gait, solver.weights, solver.samples)
+        terms = cost_terms(run.motion, solver.gait.costs, solver.weights, solver.samples)
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
         made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)
@@ -241,10 +238,9 @@ def _apart(one: Any, two: Any) -> float:
     return 0.0 if one == two else math.inf
 
 
-def _dynamics(
-    run: Run, config: StudyConfig, series: GaitSeries, numbers: dict[str, Any]
-) -> Iterator[Check]:
+def _dynamics(run: Run, series: GaitSeries, numbers: dict[str, Any]) -> Iterator[Check]:
     """Yield engines, integrator and conservation laws."""
+    config = run.config
     if config.transcription != "collocation":
         yield Check("dynamics", None, 0.0, "", _SHOOTING)
         return

@@ -8,6 +8,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig, place_of, with_values
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.studies.batch.checks import check_case, check_warm_start
@@ -15,30 +16,33 @@ from pathwalker_cli.studies.batch.names import case_name, short_keys
 from pathwalker_cli.studies.batch.people import listed_patients, listed_problems
 from pathwalker_cli.studies.batch.schema import BatchStudy, NamedCase, flat, load_batch
 
-__all__ = ["Batch", "Case", "load_cases"]
+__all__ = ["Batch", "BatchCase", "load_cases"]
 
 
 @dataclass(frozen=True)
-class Case:
+class BatchCase:
     """One patient in one problem with its overrides.
 
     Args:
         name: Its name, and that of its run folder.
-        patient: Id of the patient.
         problem: Name of the problem in the study.
-        config: All that is solved.
+        study: What is solved, and for whom.
         values: What the grid varies, by dotted key.
         variant: Name of the overrides that belong together; "" without.
         warm_start: Run to begin with.
     """
 
     name: str
-    patient: str
     problem: str
-    config: StudyConfig
+    study: Case
     values: Mapping[str, Any] = field(default_factory=dict)
     variant: str = ""
     warm_start: Path | None = None
+
+    @property
+    def patient(self) -> str:
+        """Id of the patient."""
+        return self.study.unvaried.id
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ class Batch:
     """
 
     name: str
-    cases: tuple[Case, ...]
+    cases: tuple[BatchCase, ...]
 
 
 def load_cases(path: str | Path, changes: tuple[str, ...] = ()) -> Batch:
@@ -73,14 +77,14 @@ def load_cases(path: str | Path, changes: tuple[str, ...] = ()) -> Batch:
         for name, config in listed_problems(study.problems, folders["problems"], where).items()
     }
     warm_starts = _warm_starts(study, problems, source, where)
-    cases: dict[str, Case] = {}
+    cases: dict[str, BatchCase] = {}
     known: dict[str, str] = {}
     for entry, patient in patients.items():
         for name, config in problems.items():
-            base = config.model_copy(update={"patient": entry})
-            for case in _variants(study, patient.id, name, base, where):
+            base = Case(config.model_copy(update={"patient": entry}), patient)
+            for case in _variants(study, name, base, where):
                 _check_new(case, cases, known, where)
-                check_case(case.name, case.config, patient, where)
+                check_case(case.name, case.study, where)
                 cases[case.name] = replace(case, warm_start=warm_starts.get(name))
     return Batch(source.stem, tuple(cases.values()))
 
@@ -105,9 +109,7 @@ def overridden(config: StudyConfig, values: Mapping[str, Any], where: str) -> St
     return with_values(config, plain, where) if plain else config
 
 
-def _variants(
-    study: BatchStudy, patient: str, problem: str, base: StudyConfig, where: str
-) -> Iterator[Case]:
+def _variants(study: BatchStudy, problem: str, base: Case, where: str) -> Iterator[BatchCase]:
     """Yield all cases of one patient in one problem."""
     short = short_keys(study.grid)
     for combination in product(*study.grid.values()):
@@ -115,19 +117,21 @@ def _variants(
         for variant in study.cases or (NamedCase(name="all"),):
             label = variant.name if study.cases else ""
             shown = {short[key]: value for key, value in values.items()}
-            name = case_name(patient, problem, shown, label)
+            name = case_name(base.unvaried.id, problem, shown, label)
             changes = {**values, **flat(variant.set)}
-            config = overridden(base, changes, f"{where}, case {name}")
-            yield Case(name, patient, problem, config, values, label)
+            config = overridden(base.config, changes, f"{where}, case {name}")
+            yield BatchCase(name, problem, replace(base, config=config), values, label)
 
 
-def _check_new(case: Case, cases: Mapping[str, Case], known: dict[str, str], where: str) -> None:
+def _check_new(
+    case: BatchCase, cases: Mapping[str, BatchCase], known: dict[str, str], where: str
+) -> None:
     """Refuse a case whose name or content is there already.
 
     Raises:
         ConfigError: If there is such a case.
     """
-    content = case.config.model_dump_json()
+    content = case.study.config.model_dump_json()
     if case.name in cases or content in known:
         other = known.get(content, case.name)
         same = f"cases {other} and {case.name} are the same"

@@ -4,48 +4,46 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import ConfigError, InputError, PatientError, placed
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.passage import recorded_passage
 from pathwalker_cli.gait.start import recorded_stride, start_recording
 from pathwalker_cli.gait.symmetry import require_symmetry
-from pathwalker_cli.model.walker import Walker, build_walker
-from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient.variation import varied
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.results.run_folder import warm_start_run
 
 __all__ = ["check_case", "check_patient", "check_warm_start"]
 
 
-def check_case(name: str, config: StudyConfig, patient: Patient, where: str) -> None:
+def check_case(name: str, case: Case, where: str) -> None:
     """Refuse a case that could not even begin.
 
     Args:
         name: Its name, for the message.
-        config: Its config.
-        patient: Its patient, as in the file.
+        case: Config and patient.
         where: The study, for the message.
 
     Raises:
         InputError: If the patient lacks what the problem needs, or a value does not fit.
     """
+    config = case.config
     with placed(f"{where}, case {name}"):
-        check_patient(config, patient)
+        check_patient(case)
         _check_starts(config)
-        model = config.model
-        changed = varied(patient, config.variation)
-        walker = build_walker(changed, config.condition, model.published, model.backend)
-        gait_bounds(walker, config.bounds)
+        walker = case.walker(config.model.backend)
+        gait_bounds(walker, config.bounds, config.free)
         _check_start(config, walker)
 
 
-def check_patient(config: StudyConfig, patient: Patient) -> None:
+def check_patient(case: Case) -> None:
     """Refuse a patient without what the problem needs.
 
     Raises:
         PatientError: If orthosis or strengths lack.
     """
+    config, patient = case.config, case.unvaried
     if config.condition == "orthosis" and patient.orthosis is None:
         raise PatientError(
             f"patient {patient.id} has no orthosis, which problem {config.problem} needs",
@@ -94,4 +92,4 @@ def check_warm_start(folder: Path, config: StudyConfig, where: str) -> None:
     except InputError as error:
         inner = error.where.removeprefix("--warm-start").strip()
         place = f"{where}: {inner}" if inner else where
-        raise type(error)(error.what, where=place, allowed=error.allowed, mend=error.mend) from None
+        raise error.at(place) from None

@@ -69,7 +69,7 @@ class DaskPool:
             return 1
 
     def _submit(self, task: Task, work: Work) -> Any:
-        arguments = (task.config, task.folder, task.warm_start)
+        arguments = (task.case, task.folder, task.warm_start)
         return self._client.submit(work, *arguments, pure=False)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.io.table import write_table
-from pathwalker_cli.studies.batch.cases import Case
+from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.table import (
     CONVERGED,
     PENDING,
@@ -18,7 +18,7 @@ from pathwalker_cli.studies.batch.table import (
     read_metrics,
 )
 from pathwalker_cli.studies.batch.worker import Result
-from pathwalker_cli.studies.run import is_done
+from pathwalker_cli.studies.run import done_run
 
 __all__ = ["CASES", "ENTRIES", "TABLE", "Ended", "Ledger"]
 
@@ -48,7 +48,7 @@ class Ended:
         seconds: Wall time [s]; 0 if it was there already.
     """
 
-    case: Case
+    case: BatchCase
     status: str
     metrics: Mapping[str, Any] | None = None
     seconds: float = 0.0
@@ -67,7 +67,7 @@ class Ledger:
         folder: Full path of the study's folder.
     """
 
-    def __init__(self, cases: Sequence[Case], folder: Path) -> None:
+    def __init__(self, cases: Sequence[BatchCase], folder: Path) -> None:
         self._cases = {case.name: case for case in cases}
         self._folder = folder
         self._table = CaseTable(cases)
@@ -80,17 +80,17 @@ class Ledger:
         """All cases that have ended, in order of the study."""
         return tuple(self._ended[name] for name in self._cases if name in self._ended)
 
-    def run_folder(self, case: Case) -> Path:
+    def run_folder(self, case: BatchCase) -> Path:
         """Return the run folder of a case."""
         return self._folder / CASES / case.name
 
-    def recall(self) -> list[Case]:
+    def recall(self) -> list[BatchCase]:
         """Take note of the cases that are done already; return the others."""
         (self._folder / CASES).mkdir(exist_ok=True)
         times = _read_times(self._folder / TIMES)
         for name, case in self._cases.items():
             folder = self.run_folder(case)
-            if is_done(folder, case.config):
+            if done_run(folder, case.study) is not None:
                 self._note(Ended(case, CONVERGED, read_metrics(folder)), times.get(name))
         self._write()
         return [case for name, case in self._cases.items() if name not in self._ended]

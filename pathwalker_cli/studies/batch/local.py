@@ -85,7 +85,7 @@ class LocalPool:
         lost |= dict.fromkeys([*running.values(), *(task.name for task in waiting)], NO_WORKERS)
 
     def _submit(self, pool: ProcessPool, task: Task, work: Work) -> Future[Result]:
-        arguments = (task.config, task.folder, task.warm_start)
+        arguments = (task.case, task.folder, task.warm_start)
         with deaf():
             return pool.schedule(work, args=arguments, timeout=self._time_limit)
 

@@ -11,7 +11,7 @@ from pathwalker_cli.io.atomic import sweep
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.results.run_folder import release_runs
 from pathwalker_cli.studies.base import check_folder
-from pathwalker_cli.studies.batch.cases import Case
+from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.ledger import CASES, ENTRIES, Ended, Ledger
 from pathwalker_cli.studies.batch.worker import Pool, Task, Work, solve_case
 
@@ -47,7 +47,7 @@ class Report:
 
 
 def run_batch(
-    cases: Sequence[Case], folder: Path, pool: Pool, watch: Watch, work: Work = solve_case
+    cases: Sequence[BatchCase], folder: Path, pool: Pool, watch: Watch, work: Work = solve_case
 ) -> Report:
     """Solve all cases that are not solved yet, each into its run folder, and keep the table.
 
@@ -85,7 +85,7 @@ def run_batch(
     return Report(folder, ledger.ended)
 
 
-def _task(case: Case, folder: Path) -> Task:
-    """Return a case in plain words."""
+def _task(case: BatchCase, folder: Path) -> Task:
+    """Return a case as it travels."""
     start = "" if case.warm_start is None else str(case.warm_start)
-    return Task(case.name, case.config.model_dump_json(), str(folder), start)
+    return Task(case.name, case.study, str(folder), start)

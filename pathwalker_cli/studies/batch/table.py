@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pathwalker_cli.results.tables import DIGITS
 from pathwalker_cli.stride.measures import measures_in
-from pathwalker_cli.studies.batch.cases import Case
+from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.units import unit_of
 
 __all__ = ["CONVERGED", "PENDING", "CaseTable", "numbers_of", "read_metrics"]
@@ -35,7 +35,7 @@ class CaseTable:
         cases: All cases in order.
     """
 
-    def __init__(self, cases: Sequence[Case]) -> None:
+    def __init__(self, cases: Sequence[BatchCase]) -> None:
         self._named = any(case.variant for case in cases)
         varied = {key: unit_of(key) for case in cases[:1] for key in case.values}
         columns = {"case": "", "patient": "", "problem": "", **varied}
@@ -45,7 +45,7 @@ class CaseTable:
         self.header = [f"{name} [{unit}]" if unit else name for name, unit in columns.items()]
 
     def row(
-        self, case: Case, status: str, metrics: Mapping[str, Any] | None = None
+        self, case: BatchCase, status: str, metrics: Mapping[str, Any] | None = None
     ) -> tuple[str, ...]:
         """Return the row of a case.
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, Protocol, TypedDict
 from pathwalker_cli.errors import PathwalkerError
 
 if TYPE_CHECKING:
-    pass
+    from pathwalker_cli.case import Case
 
 __all__ = ["LOST", "Pool", "Result", "Task", "Work", "failure", "solve_case"]
 
@@ -42,23 +42,23 @@ class Result(TypedDict):
 
 @dataclass(frozen=True)
 class Task:
-    """One case, in plain words that travel.
+    """One case, as it travels.
 
     Args:
         name: Name of the case.
-        config: Its config as JSON.
+        case: Its config and its patient.
         folder: Full path of its run folder.
         warm_start: Full path of the run to begin with; "" without.
     """
 
     name: str
-    config: str
+    case: Case
     folder: str
     warm_start: str = ""
 
 
-Work = Callable[[str, str, str], Result]
-"""Solves a case: config as JSON, run folder, run to begin with."""
+Work = Callable[["Case", str, str], Result]
+"""Solves a case: config and patient, run folder, run to begin with."""
 
 
 class Pool(Protocol):
@@ -79,34 +79,32 @@ def failure(reason: str, detail: str = "") -> Result:
                   worker="")  # fmt: skip
 
 
-def solve_case(config: str, folder: str, warm_start: str) -> Result:
+def solve_case(case: Case, folder: str, warm_start: str) -> Result:
     """Solve a case and write its run folder; whatever goes wrong becomes a reason.
 
     Args:
-        config: The config as JSON.
+        case: Config and patient.
         folder: The run folder.
         warm_start: Folder of the run to begin with; "" without.
     """
     with _ALONE:
         began = time.perf_counter()
-        result = _solved(config, folder, warm_start)
+        result = _solved(case, folder, warm_start)
     result["seconds"] = time.perf_counter() - began
     result["worker"] = f"{socket.gethostname()}:{os.getpid()}"
     return result
 
 
-def _solved(config: str, folder: str, warm_start: str) -> Result:
+def _solved(case: Case, folder: str, warm_start: str) -> Result:
     """Solve a case; heavy libraries are loaded here, where they are needed."""
     try:
-        from pathwalker_cli.config import StudyConfig
         from pathwalker_cli.results.run_folder import claimed_run
-        from pathwalker_cli.studies.run import is_done, run_study
+        from pathwalker_cli.studies.run import done_run, run_study
 
-        study = StudyConfig.model_validate_json(config, strict=True)
         # Dask repeats a task if its result gets lost, and ends none whose caller was killed
         with claimed_run(folder, wait=True):
-            if not is_done(Path(folder), study):
-                run_study(study, Path(folder), Path(warm_start) if warm_start else None)
+            if done_run(Path(folder), case) is None:
+                run_study(case, Path(folder), Path(warm_start) if warm_start else None)
     except PathwalkerError as error:
         return failure(str(error))
     except Exception as error:

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.case import Case
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.gait.resolve import Optimum
@@ -87,7 +87,7 @@ def landscape_of(
     )
     springs = near.optimum.stiffness.reshape(2, 2)[:, [SIDES.index(s) for s in study.sides]]
     graph = grid(k_d, k_p, tuple(np.exp(np.log(springs).mean(axis=1)).tolist()))
-    solve = near.solver(partial(with_springs, run.config, study.sides))
+    solve = near.solver(partial(with_springs, run.case, study.sides))
     root = near.optimum
     if study.side == "both":
         root = solve(ROOT, graph.points[ROOT], near.optimum)
@@ -112,11 +112,11 @@ def _corners(k_d: np.ndarray, k_p: np.ndarray) -> list[str]:
     return [point_name(i, j) for i in (0, k_d.size - 1) for j in (0, k_p.size - 1)]
 
 
-def with_springs(config: StudyConfig, sides: tuple[str, ...], values: Values) -> StudyConfig:
-    """Return a config in which the springs of some sides have given stiffnesses.
+def with_springs(case: Case, sides: tuple[str, ...], values: Values) -> Case:
+    """Return a case in which the springs of some sides have given stiffnesses.
 
     Args:
-        config: The base.
+        case: The base.
         sides: The sides.
         values: K_D and K_P [N m/rad].
     """
@@ -126,7 +126,7 @@ def with_springs(config: StudyConfig, sides: tuple[str, ...], values: Values) ->
         for name in STIFFNESSES
         if name.startswith(kind) and name.rsplit("_", 1)[1] in sides
     }
-    return with_values(config, {"bounds.stiffness": {**config.bounds.stiffness, **fixed}})
+    return case.with_values({"bounds.stiffness": {**case.config.bounds.stiffness, **fixed}})
 
 
 def _result(
@@ -176,7 +176,7 @@ def _released(near: Neighbours, side: str, best: Point, found: Exploration[Optim
     """Return where the best point ends with free springs."""
     branch = found.best(best.name)
     start = None if branch is None else branch.found
-    end = near.resolve("released", near.run.config, start)
+    end = near.resolve("released", near.run.case, start)
     numbers = measures(end) if end.converged else {}
     springs = tuple(numbers.get(f"{kind}_stiffness_{side}", float("nan")) for kind in _KINDS)
     return _point("released", springs, end.result, numbers)

@@ -14,7 +14,7 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field, field_validator
 
-from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.case import Case
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.fields import Quantity, invalid
@@ -70,11 +70,11 @@ def perturb(
         NotConvergedError: If the optimum cannot be solved to the tolerance.
     """
     began = time.perf_counter()
-    config = with_values(run.config, {"solver.tolerance": study.tolerance})
+    case = run.case.with_values({"solver.tolerance": study.tolerance})
     resolver = resolver_of(run, study.tolerance)
     base = require_optimum(resolver, run, study.tolerance)
     ranges = spring_ranges(base)
-    plan = _plan(study, config, measures(base), ranges)
+    plan = _plan(study, case, measures(base), ranges)
     journal = Journal(folder / POINTS, run, resolver)
     rows = []
     for row in _solved(plan, journal, base, study.tolerance):
@@ -86,7 +86,7 @@ def perturb(
     patient = base.solver.walker.patient.id
     seconds = time.perf_counter() - began
     return Perturbation(
-        config, patient, base.motion.intervals, measures(base), ranges, tuple(rows), seconds
+        case.config, patient, base.motion.intervals, measures(base), ranges, tuple(rows), seconds
     )
 
 
@@ -110,12 +110,12 @@ def moved_springs(study: PerturbationStudy, free: tuple[str, ...]) -> tuple[str,
     return study.springs or free
 
 
-_Point = tuple[float, float, StudyConfig]
-"""Factor, stiffness [N m/rad] and config of a neighbour."""
+_Point = tuple[float, float, Case]
+"""Factor, stiffness [N m/rad] and case of a neighbour."""
 
 
 def _plan(
-    study: PerturbationStudy, config: StudyConfig, base: Mapping[str, float], ranges: Ranges
+    study: PerturbationStudy, case: Case, base: Mapping[str, float], ranges: Ranges
 ) -> list[tuple[str, list[_Point]]]:
     """Return the neighbours by spring, nearest ones first."""
     plan = []
@@ -124,11 +124,10 @@ def _plan(
         for factor in sorted(study.factors, key=lambda factor: abs(np.log(factor))):
             # rounded, so that a restart on another machine asks for the very same number
             stiffness = round(factor * base[spring], 6)
-            held = {**config.bounds.stiffness, spring: (stiffness, stiffness)}
+            held = {**case.config.bounds.stiffness, spring: (stiffness, stiffness)}
             where = f"{spring} x {factor:g}"
-            points.append(
-                (factor, stiffness, with_values(config, {"bounds.stiffness": held}, where))
-            )
+            moved = case.with_values({"bounds.stiffness": held}, where)
+            points.append((factor, stiffness, moved))
         plan.append((spring, points))
     return plan
 
@@ -140,9 +139,9 @@ def _solved(
     ranges, before = spring_ranges(base), measures(base)
     for spring, points in plan:
         nearest = {True: base, False: base}
-        for factor, stiffness, config in points:
+        for factor, stiffness, case in points:
             name = f"{spring}-x{factor:g}"
-            optimum = journal.resolve(name, config, nearest[factor < 1.0])
+            optimum = journal.resolve(name, case, nearest[factor < 1.0])
             if optimum.converged:
                 nearest[factor < 1.0] = optimum
             yield _perturbed(spring, (factor, stiffness), optimum, before, ranges, tolerance)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.case import Case
 from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.gait.bounds import held
@@ -100,23 +100,22 @@ def sensitivities(asked: SensitivityStudy, run: Run, folder: Path) -> Sensitivit
         ConfigError: If a place does not exist, or a check is asked for what is not.
         NotConvergedError: If the optimum cannot be solved to the tolerance.
     """
-    config = with_values(run.config, {"solver.tolerance": asked.tolerance})
+    case = run.case.with_values({"solver.tolerance": asked.tolerance})
     resolver = resolver_of(run, asked.tolerance)
     require_optimum(resolver, run, asked.tolerance)
     around = Neighbourhood(resolver)
     began = time.perf_counter()
     patient = around.optimum.solver.walker.patient
-    worn = config.condition == "orthosis"
+    worn = case.config.condition == "orthosis"
     places = asked_places(asked, around.free, patient, worn)
     base = all_measures(around.optimum)
     rows = tuple(_sensitivity(around, place, base) for place in places)
     seconds = time.perf_counter() - began
     journal = Journal(folder / POINTS, run, resolver)
-    checks = tuple(
-        _check(around, journal, config, place, asked.check_step) for place in asked.check
-    )
+    checks = tuple(_check(around, journal, case, place, asked.check_step) for place in asked.check)
     kkt = around.kkt
-    return Sensitivities(config, patient.id, base, rows, checks, kkt.active, kkt.doubtful, seconds)
+    found = (base, rows, checks, kkt.active, kkt.doubtful, seconds)
+    return Sensitivities(case.config, patient.id, *found)
 
 
 def _sensitivity(around: Neighbourhood, place: str, base: Mapping[str, float]) -> Sensitivity:
@@ -154,14 +153,12 @@ def _value(optimum: Optimum, place: str) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
 
-def _check(
-    around: Neighbourhood, journal: Journal, config: StudyConfig, place: str, step: float
-) -> Check:
+def _check(around: Neighbourhood, journal: Journal, case: Case, place: str, step: float) -> Check:
     """Return the central difference of two solves."""
     ends = []
     for sign in (-1.0, 1.0):
         values = _moved(around.optimum, place, 1.0 + sign * step)
-        found = journal.resolve(f"{place}{sign * step:+g}", with_values(config, values))
+        found = journal.resolve(f"{place}{sign * step:+g}", case.with_values(values))
         if not found.converged:
             raise NotConvergedError(f"the check of {place} did not converge: {found.result.status}")
         ends.append(found)

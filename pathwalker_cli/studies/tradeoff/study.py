@@ -10,7 +10,8 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, field_validator
 
-from pathwalker_cli.config import StudyConfig, with_values
+from pathwalker_cli.case import Case
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.config.schema import Weight
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.resolve import Optimum
@@ -23,7 +24,7 @@ from pathwalker_cli.studies.branches import explore
 from pathwalker_cli.studies.graph import Exploration, Graph, Rules, Values
 from pathwalker_cli.studies.measures import measures
 from pathwalker_cli.studies.neighbours import Neighbours, motion_signature
-from pathwalker_cli.studies.run import RunLog, is_done
+from pathwalker_cli.studies.run import RunLog, done_run
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
 __all__ = ["TradeoffStudy", "chain", "require_prediction", "tradeoff_of"]
@@ -81,7 +82,7 @@ def tradeoff_of(
     require_prediction(run.config)
     near = Neighbours(run, folder / "points", study.max_iterations, tell)
     base = run.config.cost.walking_speed_weight
-    solve = near.solver(lambda values: with_weight(run.config, values))
+    solve = near.solver(lambda values: with_weight(run.case, values))
     rules: Rules[Optimum] = Rules(
         lambda one, other: 1.0, motion_signature, without_reward, jump=0.0, sweeps=study.sweeps
     )
@@ -106,9 +107,9 @@ def require_prediction(config: StudyConfig) -> None:
                           allowed="a prediction, e.g. mapd-orthosis")  # fmt: skip
 
 
-def with_weight(config: StudyConfig, values: Values) -> StudyConfig:
-    """Return a config with another weight of walking speed, the only one of the values."""
-    return with_values(config, {"cost.walking_speed_weight": values[0]})
+def with_weight(case: Case, values: Values) -> Case:
+    """Return a case with another weight of walking speed, the only one of the values."""
+    return case.with_values({"cost.walking_speed_weight": values[0]})
 
 
 def without_reward(optimum: Optimum) -> float:
@@ -170,9 +171,9 @@ class _Refined:
     def point(self, checked: _Checked) -> FrontPoint:
         """Return a point with the numbers of a refined mesh, if that converges."""
         assert checked.optimum is not None  # noqa: S101 - called for points with an optimum
-        folder, config = self._folder / f"w{checked.weight:g}", checked.optimum.config
-        if not is_done(folder, config):
-            solution = GaitSolver(config, self._log).solve(checked.optimum.motion)
+        folder, case = self._folder / f"w{checked.weight:g}", checked.optimum.case
+        if done_run(folder, case) is None:
+            solution = GaitSolver(case, self._log).solve(checked.optimum.motion)
             write_run(folder, solution, self._log.lines)
         metrics = load_run(folder, allow_unconverged=True).metrics
         self.seconds += metrics["seconds_solve"]

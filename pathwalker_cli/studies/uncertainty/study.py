@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final
 
 from pydantic import Field
 
-from pathwalker_cli.config import StudyConfig, study_patient, with_values
+from pathwalker_cli.case import Case
 from pathwalker_cli.errors import InputError, PatientError
 from pathwalker_cli.io.fields import Quantity
-from pathwalker_cli.patient import load_patient
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import NeighbourStudy, require_optimum, resolver_of
 from pathwalker_cli.studies.measures import measures
@@ -21,7 +21,7 @@ from pathwalker_cli.studies.springs import spring_ranges
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, draw, inputs_of
 from pathwalker_cli.studies.uncertainty.result import Uncertainty
 
-__all__ = ["UncertaintyStudy", "draw_configs", "uncertainty"]
+__all__ = ["UncertaintyStudy", "draw_cases", "uncertainty"]
 
 DRAWS: Final = "draws"
 """Folder of the solved draws."""
@@ -56,14 +56,14 @@ def uncertainty(
         NotConvergedError: If the optimum cannot be solved to the tolerance.
     """
     began = time.perf_counter()
-    config = with_values(run.config, {"solver.tolerance": study.tolerance})
-    draws = draw(inputs_of(study.quantities, load_patient(config.patient)), study.draws, study.seed)
-    jobs = [Job(f"draw-{i:05d}", c) for i, c in enumerate(draw_configs(config, draws))]
+    case = run.case.with_values({"solver.tolerance": study.tolerance})
+    draws = draw(inputs_of(study.quantities, case.unvaried), study.draws, study.seed)
+    jobs = [Job(f"draw-{i:05d}", drawn) for i, drawn in enumerate(draw_cases(case, draws))]
     base = require_optimum(resolver_of(run, study.tolerance), run, study.tolerance)
-    solved = list(solve_jobs(jobs, run.folder, folder / DRAWS, study.tolerance, workers, told))
+    solved = list(solve_jobs(jobs, run, folder / DRAWS, study.tolerance, workers, told))
     solved.sort(key=lambda end: end.name)
     return Uncertainty(
-        config=config,
+        config=case.config,
         patient=base.solver.walker.patient.id,
         intervals=base.motion.intervals,
         base=measures(base),
@@ -75,22 +75,22 @@ def uncertainty(
     )
 
 
-def draw_configs(config: StudyConfig, draws: Draws) -> list[StudyConfig]:
-    """Return the config of every draw; all are checked before any is solved.
+def draw_cases(case: Case, draws: Draws) -> list[Case]:
+    """Return the case of every draw; all are checked before any is solved.
 
     Args:
-        config: The base; what it varies already is varied still.
+        case: The base; what it varies already is varied still.
         draws: What was drawn.
 
     Raises:
         PatientError: If a patient that was drawn is refused.
     """
-    configs = []
+    cases = []
     for number in range(len(draws.values)):
-        variation = config.variation.merged(draws.variation(number))
-        drawn = config.model_copy(update={"variation": variation})
+        variation = case.config.variation.merged(draws.variation(number))
+        drawn = replace(case, config=case.config.model_copy(update={"variation": variation}))
         try:
-            study_patient(drawn)
+            _ = drawn.patient
         except InputError as error:
             raise PatientError(
                 f"draw {number} gives a patient who is refused: {error.what}",
@@ -98,5 +98,5 @@ def draw_configs(config: StudyConfig, draws: Draws) -> list[StudyConfig]:
                 allowed=error.allowed,
                 mend="choose smaller spreads",
             ) from None
-        configs.append(drawn)
-    return configs
+        cases.append(drawn)
+    return cases

@@ -1,0 +1,125 @@
+"""One case: a patient and a config, read and validated once; from here on it is what travels."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pathwalker_cli.config import StudyConfig, load_config, with_values
+from pathwalker_cli.errors import PatientError
+from pathwalker_cli.io.yaml_file import yaml_text
+from pathwalker_cli.patient import Patient, load_patient
+from pathwalker_cli.patient.variation import varied
+
+if TYPE_CHECKING:
+    from pathwalker_cli.model.walker import Walker
+
+__all__ = ["Case", "config_text", "load_case"]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is solved, and for whom.
+
+    Args:
+        config: The config.
+        unvaried: The patient as in the file, before the variation of the config; it knows the
+            bytes that it was read from, and where its recordings stand.
+    """
+
+    config: StudyConfig
+    unvaried: Patient
+
+    @classmethod
+    def of(cls, study: StudyConfig | Case) -> Case:
+        """Return the case of a config, whose patient is read now; a case stays what it is.
+
+        Raises:
+            PatientError: If there is no such patient, or its file is refused.
+            ConfigError: If the variation does not fit the patient.
+        """
+        if isinstance(study, Case):
+            return study
+        try:
+            case = cls(study, load_patient(study.patient))
+        except PatientError as error:
+            raise error.at(error.where or "patient") from None
+        _ = case.patient  # what does not fit is refused here, where it is read
+        return case
+
+    @cached_property
+    def patient(self) -> Patient:
+        """The patient with the variation of the config.
+
+        Raises:
+            ConfigError: If the variation does not fit the patient.
+            PatientError: If the patient that results is refused.
+        """
+        return varied(self.unvaried, self.config.variation)
+
+    def walker(self, backend: str = "auto") -> Walker:
+        """Return the walking model of the patient in the condition of the problem.
+
+        Args:
+            backend: Dynamics back end, see `model.backends`.
+
+        Raises:
+            PatientError: If the patient lacks strengths or an orthosis that is worn.
+            ConfigError: If a number is to be free that does not exist.
+        """
+        from pathwalker_cli.model.walker import build_walker  # takes long: only who needs it
+
+        config = self.config
+        free = tuple(config.free)
+        return build_walker(self.patient, config.condition, config.model.published, backend, free)
+
+    def with_values(self, values: Mapping[str, Any], where: str = "") -> Case:
+        """Return the case with other values in its config; see `config.with_values`.
+
+        The patient is read anew only if the values name another one.
+        """
+        config = with_values(self.config, values, where)
+        if config.patient != self.config.patient:
+            return Case.of(config)
+        return replace(self, config=config)
+
+    @property
+    def content_hash(self) -> str | None:
+        """SHA-256 of the bytes that the patient was read from; None if it was not read."""
+        if self.unvaried.source is None:
+            return None
+        return hashlib.sha256(self.unvaried.content).hexdigest()
+
+    @property
+    def patient_text(self) -> str:
+        """The patient before any variation as YAML in one piece, the orthosis in its place."""
+        content = self.unvaried.model_dump(mode="json", exclude_none=True)
+        return yaml_text(content, "The patient of this run, before any variation of the config.")
+
+
+def config_text(config: StudyConfig) -> str:
+    """Return a config with all defaults filled in, as YAML that `load_config` reads."""
+    return yaml_text(config.model_dump(mode="json"), "The config of this run, every value written.")
+
+
+def load_case(path: str | Path, problem: str = "", changes: tuple[str, ...] = ()) -> Case:
+    """Read a config and its patient.
+
+    Args:
+        path: The config, a YAML file or the name of a shipped one, e.g. "mapd-orthosis".
+        problem: Problem that was asked for; it must be the config's own.
+        changes: Overrides "dotted.key=value", as from the command line.
+
+    Raises:
+        ConfigError: If file or overrides are wrong.
+        PatientError: If there is no such patient, or its file is refused.
+    """
+    config = load_config(path, problem, changes)
+    try:
+        return Case.of(config)
+    except PatientError as error:
+        raise error.at(f"{path}, patient" if error.where == "patient" else error.where) from None

@@ -1,0 +1,414 @@
+"""The cost of walking: every term of the objective as one object (docs/theory.md, 2.3 and 2.4).
+
+A term is a few running costs and one expression in their integrals, written so that they take
+numbers, arrays and CasADi expressions alike.  A further goal is an entry of `GOALS` and nothing
+else: config, nonlinear program and results follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+
+from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, SUFFIX
+from pathwalker_cli.model.contact import PHASES, ContactPhase
+
+__all__ = ["BASE", "COMFORT_COORDINATES", "GOALS", "CostTerm", "Costs", "Instant", "Totals"]
+
+Weights = Mapping[str, float]
+"""Weight of every term by its name; what is missing counts nothing."""
+
+COMFORT_COORDINATES: Final = ANGLES
+"""Coordinates that may have a comfortable range: all but the position of the pelvis."""
+
+RATE_SIZE, ACCELERATION_SIZE, FORCE_SIZE = 20.0, 50.0, 20.0
+"""What counts as 1: an activation rate [1/s], an acceleration [m/s^2, rad/s^2], a reserve force or
+residual [N, N m]; with these the prototypes needed the fewest iterations."""
+
+_PEAK_POWER: Final = 8
+"""Power of the mean that stands for the largest activation."""
+_PEAK_FLOOR: Final = 1e-6
+"""Keeps the derivative of the root finite where no muscle is active: a peak of 0.18."""
+_COMFORT_ROUNDING: Final = 0.01
+"""Half width to which the edge of a comfortable range is rounded off [rad]."""
+_UNBOUNDED: Final = 10.0
+"""Edge of a comfortable range that is not given [rad]."""
+
+
+@dataclass(frozen=True)
+class Instant:
+    """What running costs see at one instant, or at many if every entry is an array.
+
+    Args:
+        phase: The contact phase.
+        q: Generalised coordinates, 10 entries [m, rad].
+        v: Generalised velocities, 10 entries [m/s, rad/s].
+        activation: Activations, 14 entries.
+        force: Contact forces of the phase in the order of `phase.forces` [N].
+        rate: Activation rates, 14 entries [1/s].
+        excitation: Excitations, 14 entries.
+        vdot: Generalised accelerations, 10 entries [m/s^2, rad/s^2].
+        reserve: Reserve forces, 10 entries [N, N m].
+        reference: Coordinates that are followed, 10 entries [m, rad].
+        power: Power of the activations in the effort.
+        data: Numbers of the term, see `CostTerm.size`.
+    """
+
+    phase: ContactPhase
+    q: Sequence[Any]
+    v: Sequence[Any]
+    activation: Sequence[Any]
+    force: Sequence[Any]
+    rate: Sequence[Any] = ()
+    excitation: Sequence[Any] = ()
+    vdot: Sequence[Any] = ()
+    reserve: Sequence[Any] = ()
+    reference: Sequence[Any] = ()
+    power: int = field(default=2, kw_only=True)
+    data: Sequence[Any] = ()
+
+    @property
+    def stance(self) -> tuple[str, ...]:
+        """Suffixes of the feet on the ground."""
+        return tuple(sorted(SUFFIX[side] for side in self.phase.feet))
+
+    @property
+    def first_step(self) -> bool:
+        """Whether the phase belongs to the first half of the stride."""
+        return PHASES.index(self.phase) < len(PHASES) // 2
+
+    @property
+    def vertical_force(self) -> dict[str, Any]:
+        """Vertical force by contact point, 0 for points in the air [N]."""
+        loads = {f.point.name: self.force[i] for i, f in enumerate(self.phase.forces) if f.bears}
+        return {point: loads.get(point, 0.0) for point in CONTACT_POINTS}
+
+    def angle(self, name: str) -> Any:
+        """Return a coordinate by its name."""
+        return self.q[COORDINATES.index(name)]
+
+
+@dataclass(frozen=True)
+class Totals:
+    """What the value of a term is made of; expressions or numbers of a whole stride.
+
+    Args:
+        integrals: Integrals of the running costs by name.
+        distance: Distance of the stride [m].
+        time: Time of the stride [s].
+        durations: Durations of the eight phases, or of four of half a cycle [s].
+    """
+
+    integrals: Mapping[str, Any]
+    distance: Any
+    time: Any
+    durations: Sequence[Any]
+
+
+@dataclass(frozen=True)
+class CostTerm:
+    """A term of the objective.
+
+    Args:
+        summary: What it asks for, in words.
+        integrals: Names of its running costs.
+        integrands: The running costs at an instant, in that order.
+        value: The term without its weight.
+        unit: Unit of the value.
+        size: How many numbers it takes, see `Instant.data`.
+        whole_stride: Whether it makes no sense for half a cycle of a symmetric gait.
+        per_distance: Whether the value is still to be divided by the distance.
+        result: Its name among the cost terms of a result; "" for what only helps a start.
+    """
+
+    summary: str
+    integrals: tuple[str, ...]
+    integrands: Callable[[Instant], tuple[Any, ...]]
+    value: Callable[[Totals], Any]
+    unit: str
+    size: int = 0
+    whole_stride: bool = False
+    per_distance: bool = False
+    result: str = ""
+
+
+def _squares(values: Sequence[Any], scale: float = 1.0) -> Any:
+    return sum((value / scale) ** 2 for value in values)
+
+
+def _of(name: str) -> Callable[[Totals], Any]:
+    """Return the integral of one running cost as a value."""
+    return lambda total: total.integrals[name]
+
+
+def _none(point: Instant) -> tuple[Any, ...]:
+    return ()
+
+
+def _effort(point: Instant) -> tuple[Any, ...]:
+    return (sum(a**point.power for a in point.activation),)
+
+
+def _rates(point: Instant) -> tuple[Any, ...]:
+    return (_squares(point.rate, RATE_SIZE),)
+
+
+def _accelerations(point: Instant) -> tuple[Any, ...]:
+    return (_squares(point.vdot, ACCELERATION_SIZE),)
+
+
+def _distance_from_reference(point: Instant) -> tuple[Any, ...]:
+    return (_squares([a - b for a, b in zip(point.q, point.reference, strict=True)]),)
+
+
+def _reserves(point: Instant) -> tuple[Any, ...]:
+    return (_squares(point.reserve, FORCE_SIZE),)
+
+
+def _excitations(point: Instant) -> tuple[Any, ...]:
+    return (_squares(point.excitation),)
+
+
+BASE: Final[dict[str, CostTerm]] = {
+    "effort": CostTerm(
+        "little effort: activations to a power per distance, equation (9)",
+        ("effort",), _effort, _of("effort"), "s/m", per_distance=True, result="effort_per_distance",
+    ),
+    "rate": CostTerm(
+        "calm controls: squared activation rates per distance (regularisation)",
+        ("rate",), _rates, _of("rate"), "s/m", per_distance=True, result="rate_regularisation",
+    ),
+    "acceleration": CostTerm(
+        "calm limbs: squared accelerations per distance (regularisation)",
+        ("acceleration",), _accelerations, _of("acceleration"), "s/m", per_distance=True,
+        result="acceleration_regularisation",
+    ),
+    "tracking": CostTerm(
+        "follow a stride: integral of (q - q_ref)^2",
+        ("tracking",), _distance_from_reference, _of("tracking"), "rad^2 s",
+    ),
+    "reserve": CostTerm(
+        "no help from outside: integral of the squared reserve forces",
+        ("reserve",), _reserves, _of("reserve"), "s",
+    ),
+    "smoothing": CostTerm(
+        "calm muscles: integrals of squared activations and rates, not per distance",
+        (), _none, lambda total: total.integrals["effort"] + total.integrals["rate"], "s",
+    ),
+    "walking_speed": CostTerm(
+        "speed, equation (10)",
+        (), _none, lambda total: -(total.distance / total.time), "m/s", result="walking_speed",
+    ),
+}  # fmt: skip
+"""The terms of every gait by the names of their weights."""
+
+EXCITATION: Final = CostTerm(
+    "little excitation: integral of the squared excitations, equation (8)",
+    ("excitation",), _excitations, _of("excitation"), "s", result="excitation_regularisation",
+)  # fmt: skip
+"""A further term of a passage that follows a recording; the other one, "fit", is the weight of the
+sum over recorded instants of (q - q_recorded)^2."""
+
+
+def _crouch(point: Instant) -> tuple[Any, ...]:
+    return (sum(point.angle(f"knee_{side}") ** 2 for side in point.stance),)
+
+
+def _asymmetry(point: Instant) -> tuple[Any, ...]:
+    advance = point.v[0] if point.first_step else 0.0 * point.v[0]
+    joints = ("hip", "knee", "ankle")
+    return advance, *(point.angle(f"{j}_r") - point.angle(f"{j}_l") for j in joints)
+
+
+def _asymmetry_value(total: Totals) -> Any:
+    advance, *differences = (total.integrals[name] for name in GOALS["asymmetry"].integrals)
+    half = len(PHASES) // 2
+    pairs = [(total.durations[i], total.durations[i + half]) for i in range(half)]
+    squares = [(2.0 * advance - total.distance) / total.distance]
+    squares += [(first - second) / total.time for first, second in pairs]
+    squares += [difference / total.time for difference in differences]
+    return sum(square**2 for square in squares)
+
+
+def _pressure(point: Instant) -> tuple[Any, ...]:
+    force, weight = point.vertical_force, point.data[0]
+    return (sum(((force[f"toe_{s}"] - force[f"heel_{s}"]) / weight) ** 2 for s in "rl"),)
+
+
+def _peak(point: Instant) -> tuple[Any, ...]:
+    return (sum(a**_PEAK_POWER for a in point.activation),)
+
+
+def _peak_value(total: Totals) -> Any:
+    return (total.integrals["peak_activation"] / total.time + _PEAK_FLOOR) ** (1.0 / _PEAK_POWER)
+
+
+def _discomfort(point: Instant) -> tuple[Any, ...]:
+    count, cost = len(COMFORT_COORDINATES), 0.0
+    for i, name in enumerate(COMFORT_COORDINATES):
+        angle, lower, upper = point.angle(name), point.data[i], point.data[count + i]
+        cost = cost + _beyond(angle - upper) ** 2 + _beyond(lower - angle) ** 2
+    return (cost,)
+
+
+def _beyond(x: Any) -> Any:
+    """Return x where it is positive and 0 elsewhere, rounded off."""
+    return 0.5 * (x + (x * x + _COMFORT_ROUNDING**2) ** 0.5)
+
+
+def _mean(name: str) -> Callable[[Totals], Any]:
+    """Return the mean over the stride of one running cost as a value."""
+    return lambda total: total.integrals[name] / total.time
+
+
+GOALS: Final[dict[str, CostTerm]] = {
+    "crouch": CostTerm(
+        "stand straighter: mean square of the knee flexion of stance",
+        ("crouch",),
+        _crouch,
+        _mean("crouch"),
+        "rad^2",
+    ),
+    "asymmetry": CostTerm(
+        "equal left and right: steps, times of phases, mean hip, knee and ankle angles",
+        ("first_advance", "hip_difference", "knee_difference", "ankle_difference"),
+        _asymmetry,
+        _asymmetry_value,
+        "1",
+        whole_stride=True,
+    ),
+    "centre_of_pressure": CostTerm(
+        "less movement of the centre of pressure: mean square of its distance from the middle of "
+        "the foot in half foot lengths, times the load of the foot in body weights",
+        ("centre_of_pressure",),
+        _pressure,
+        _mean("centre_of_pressure"),
+        "1",
+        size=1,
+    ),
+    "peak_activation": CostTerm(
+        "spare the muscle that works hardest: 8th root of the mean 8th power of all activations",
+        ("peak_activation",),
+        _peak,
+        _peak_value,
+        "1",
+    ),
+    "discomfort": CostTerm(
+        "stay in comfortable joint ranges: mean square of how far angles are outside them",
+        ("discomfort",),
+        _discomfort,
+        _mean("discomfort"),
+        "rad^2",
+        size=2 * len(COMFORT_COORDINATES),
+    ),
+}
+"""All goals by the name that configs and results use."""
+
+
+@dataclass(frozen=True)
+class Costs:
+    """The terms of a problem: those of every gait, and the clinical goals that count.
+
+    Args:
+        names: Names of the goals that count, in the order of `GOALS`.
+        activation_power: Power of the activations in the effort.
+        comfort_ranges: Comfortable range by coordinate [rad].
+        passage: Whether a recorded passage is followed, equation (8).
+    """
+
+    names: tuple[str, ...] = ()
+    activation_power: int = 2
+    comfort_ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    passage: bool = False
+
+    @property
+    def structure(self) -> tuple[tuple[str, ...], int]:
+        """What expressions depend on."""
+        return self.names, self.activation_power
+
+    @property
+    def goals(self) -> dict[str, CostTerm]:
+        """The clinical goals that count."""
+        return {name: GOALS[name] for name in self.names}
+
+    @property
+    def terms(self) -> dict[str, CostTerm]:
+        """All terms by the names of their weights, but that of the recorded instants."""
+        last = {"excitation": EXCITATION} if self.passage else {}
+        return {**BASE, **self.goals, **last}
+
+    @property
+    def weighed(self) -> tuple[str, ...]:
+        """Names of all weights."""
+        return (*self.terms, "fit")
+
+    @property
+    def integrals(self) -> tuple[str, ...]:
+        """Names of all running costs."""
+        return tuple(integral for term in self.terms.values() for integral in term.integrals)
+
+    @property
+    def size(self) -> int:
+        """How many numbers the terms take."""
+        return sum(term.size for term in self.terms.values())
+
+    def numbers(self, weight: float) -> np.ndarray:
+        """Return the numbers of all terms, shape (size,).
+
+        Args:
+            weight: Body weight with what is worn [N].
+        """
+        ranges = [
+            self.comfort_ranges.get(name, (-_UNBOUNDED, _UNBOUNDED)) for name in COMFORT_COORDINATES
+        ]
+        known = {
+            "centre_of_pressure": np.array([weight]),
+            "discomfort": np.array(ranges).T.ravel(),
+        }
+        return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])
+
+    def integrands(
+        self,
+        point: Instant,
+        numbers: Sequence[Any],
+        terms: Mapping[str, CostTerm] | None = None,
+    ) -> list[Any]:
+        """Return the running costs at an instant.
+
+        Args:
+            point: The instant; power and data are filled in here.
+            numbers: What `numbers` returns, or symbols for it.
+            terms: The terms, if not all.
+        """
+        values: list[Any] = []
+        at = 0
+        for term in (self.terms if terms is None else terms).values():
+            data = numbers[at : at + term.size]
+            values += term.integrands(replace(point, power=self.activation_power, data=data))
+            at += term.size
+        return values
+
+    def objective(self, weights: Mapping[str, Any], total: Totals) -> Any:
+        """Return what is minimised, but for the recorded instants; numbers or expressions."""
+        terms = self.terms.items()
+        shared = sum(weights[name] * term.value(total) for name, term in terms if term.per_distance)
+        rest = [weights[name] * term.value(total) for name, term in terms if not term.per_distance]
+        return sum(rest, shared / total.distance)
+
+    def values(self, weights: Weights, total: Totals) -> dict[str, float]:
+        """Return the weighed terms by the names that results give them."""
+        values = {}
+        for name, term in self.terms.items():
+            value = weights.get(name, 0.0) * term.value(total)
+            if name in GOALS or term.result:
+                values[term.result or name] = float(
+                    value / total.distance if term.per_distance else value
+                )
+        return values
+
+    def goal_values(self, total: Totals) -> dict[str, Any]:
+        """Return the goals without weights by name."""
+        return {name: term.value(total) for name, term in self.goals.items()}
