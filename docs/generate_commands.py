@@ -49,7 +49,7 @@ def page() -> str:
     head = _HEAD.format(not_converged=NOT_CONVERGED, refused=REFUSED, stopped=STOPPED)
     context = click.Context(cli, info_name="pathwalker")
     sections = []
-    for name, (_, _, line) in COMMANDS.items():
+    for name, (_, line) in COMMANDS.items():
         command = cli.get_command(context, name)
         assert command is not None, name
         head += f"| [`{name}`](#{name}) | {line} |\n"

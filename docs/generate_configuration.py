@@ -19,7 +19,7 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.inverse.markers import MarkerSet
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematicsConfig
 from pathwalker_cli.io.commented_yaml import reasons
-from pathwalker_cli.io.described import described, field_at, is_model
+from pathwalker_cli.io.fields import described, field_at, is_model
 from pathwalker_cli.patient import OrthosisData, Patient
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.starter.files import explained_keys

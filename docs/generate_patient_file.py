@@ -15,8 +15,7 @@ from generate_configuration import row
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from pathwalker_cli.io.described import is_model, side_type
-from pathwalker_cli.io.fields import Sides
+from pathwalker_cli.io.fields import Sides, is_model, side_type
 from pathwalker_cli.patient import Patient
 
 PAGE: Final = Path(__file__).with_name("patient-file.md")

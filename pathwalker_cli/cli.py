@@ -14,7 +14,7 @@ import click
 
 from pathwalker_cli import __version__
 from pathwalker_cli.commands.examples import examples_epilog
-from pathwalker_cli.commands.json_output import print_failure
+from pathwalker_cli.commands.options import print_failure
 from pathwalker_cli.errors import NotConvergedError, PathwalkerError
 
 __all__ = ["COMMANDS", "GROUPS", "NOT_CONVERGED", "REFUSED", "STOPPED", "cli", "main"]
@@ -27,124 +27,56 @@ STOPPED_TEXT: Final = "stopped by the user; what was finished before is kept"
 STOPPED: Final = 130
 """Exit code after Ctrl-C, by custom 128 + SIGINT."""
 
-COMMANDS: Final[dict[str, tuple[str, str, str]]] = {
-    "solve": (
-        "pathwalker_cli.commands.solve",
-        "solve_command",
-        "Predict the gait of a patient by optimal control.",
-    ),
-    "perturb": (
-        "pathwalker_cli.commands.perturb",
-        "perturb_command",
-        "Move every orthosis spring a little and see what changes.",
-    ),
+COMMANDS: Final[dict[str, tuple[str, str]]] = {
+    "solve": ("solve", "Predict the gait of a patient by optimal control."),
+    "perturb": ("studies", "Move every orthosis spring a little and see what changes."),
     "sensitivity": (
-        "pathwalker_cli.commands.sensitivity",
-        "sensitivity_command",
+        "studies",
         "Tell what one percent of every number of patient and orthosis changes.",
     ),
     "uncertainty": (
-        "pathwalker_cli.commands.uncertainty",
-        "uncertainty_command",
+        "studies",
         "Draw the uncertain numbers of a patient and see how far the answers spread.",
     ),
-    "evaluate": (
-        "pathwalker_cli.commands.evaluate",
-        "evaluate_command",
-        "Compare predicted gait with the recordings of the patient.",
-    ),
-    "verify": (
-        "pathwalker_cli.commands.verify",
-        "verify_command",
-        "Check run folders: files, equations of motion, balances, optimality.",
-    ),
-    "rerun": (
-        "pathwalker_cli.commands.verify",
-        "rerun_command",
-        "Solve a run again from its folder alone and tell how the two differ.",
-    ),
-    "compare": (
-        "pathwalker_cli.commands.compare",
-        "compare_command",
-        "Compare the metrics of runs, with differences and figures.",
-    ),
-    "report": (
-        "pathwalker_cli.commands.report",
-        "report_command",
-        "Write one HTML page about runs, recorded gait or a cohort.",
-    ),
+    "evaluate": ("compare", "Compare predicted gait with the recordings of the patient."),
+    "verify": ("verify", "Check run folders: files, equations of motion, balances, optimality."),
+    "rerun": ("verify", "Solve a run again from its folder alone and tell how the two differ."),
+    "compare": ("compare", "Compare the metrics of runs, with differences and figures."),
+    "report": ("pages", "Write one HTML page about runs, recorded gait or a cohort."),
     "reproduce": (
-        "pathwalker_cli.commands.reproduce",
-        "reproduce_command",
+        "reproduce",
         "Reproduce the article from the shipped data, with one page of results.",
     ),
     "batch": (
-        "pathwalker_cli.commands.batch",
-        "batch_command",
+        "batch",
         "Solve every case of a study: patients, problems and overrides in any number.",
     ),
-    "landscape": (
-        "pathwalker_cli.commands.landscape",
-        "landscape_command",
-        "Map the cost over the spring stiffnesses of a side.",
-    ),
-    "tradeoff": (
-        "pathwalker_cli.commands.tradeoff",
-        "tradeoff_command",
-        "Find what walking faster costs, and which springs suit which speed.",
-    ),
+    "landscape": ("studies", "Map the cost over the spring stiffnesses of a side."),
+    "tradeoff": ("studies", "Find what walking faster costs, and which springs suit which speed."),
     "animate": (
-        "pathwalker_cli.commands.animate",
-        "animate_command",
+        "pages",
         "Draw the walker of one or two runs, moving: a page for the browser, a GIF or an MP4.",
     ),
-    "view": (
-        "pathwalker_cli.commands.view",
-        "view_command",
-        "Show the stride of a run in 3D.",
-    ),
-    "model": (
-        "pathwalker_cli.commands.model",
-        "model_command",
-        "Write the walking model of a patient as a URDF.",
-    ),
-    "import": (
-        "pathwalker_cli.commands.recorded",
-        "import_command",
-        "Turn C3D files into joint angles, events and forces.",
-    ),
-    "ik": (
-        "pathwalker_cli.commands.recorded",
-        "ik_command",
-        "Compute joint angles from the markers of C3D files.",
-    ),
-    "id": (
-        "pathwalker_cli.commands.recorded",
-        "id_command",
-        "Compute joint torques and muscle strengths from recorded gait.",
-    ),
+    "view": ("pages", "Show the stride of a run in 3D."),
+    "model": ("model", "Write the walking model of a patient as a URDF."),
+    "import": ("recorded", "Turn C3D files into joint angles, events and forces."),
+    "ik": ("recorded", "Compute joint angles from the markers of C3D files."),
+    "id": ("recorded", "Compute joint torques and muscle strengths from recorded gait."),
     "init": (
-        "pathwalker_cli.commands.init",
-        "init_command",
+        "init",
         "Write a folder for a new child: patient, orthosis and configs that explain themselves.",
     ),
     "check": (
-        "pathwalker_cli.commands.check",
-        "check_command",
+        "check",
         "Check configs, patients and marker sets, and say what would be solved; nothing is solved.",
     ),
     "completion": (
-        "pathwalker_cli.commands.completion",
-        "completion_command",
+        "complete",
         "Print the script that completes commands, options, configs, problems and runs in SHELL.",
     ),
-    "doctor": (
-        "pathwalker_cli.commands.doctor",
-        "doctor_command",
-        "Check that everything PathWalker needs is there and works.",
-    ),
+    "doctor": ("doctor", "Check that everything PathWalker needs is there and works."),
 }
-"""Module, attribute and first line of help of every command: listing them imports none."""
+"""Module and first line of help of every command: listing them imports none."""
 
 
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
@@ -174,8 +106,8 @@ class _LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
-        module, attribute, _ = COMMANDS[cmd_name]
-        command: click.Command = getattr(import_module(module), attribute)
+        module = import_module(f"pathwalker_cli.commands.{COMMANDS[cmd_name][0]}")
+        command: click.Command = getattr(module, f"{cmd_name}_command")
         command.epilog = examples_epilog(cmd_name)
         return command
 
@@ -193,7 +125,7 @@ class _LazyGroup(click.Group):
         for heading, names in {**GROUPS, "Others": others}.items():
             if names:
                 with formatter.section(heading):
-                    rows = [(f"{name:<{width}}", COMMANDS[name][2]) for name in names]
+                    rows = [(f"{name:<{width}}", COMMANDS[name][1]) for name in names]
                     formatter.write_dl(rows)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -233,7 +165,7 @@ def _stoppable() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         raise KeyboardInterrupt
 
-    # a command that runs in the background stays deaf, and only the main thread may ask
+    # a command that runs in the background does not hear it, and only the main thread may ask
     main = threading.current_thread() is threading.main_thread()
     if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield stopped

@@ -22,8 +22,7 @@ from click.testing import CliRunner
 from broken import ANGLES, ARCHIVES, EVENTS, HTML, JSON, TABLES, YAML, angles, bomb
 from conftest import MadeSolution
 from made_c3d import write_c3d
-from pathwalker_cli.checking.kinds import KINDS
-from pathwalker_cli.checking.recorded import check_orthosis
+from pathwalker_cli.checking.kinds import KINDS, check_orthosis
 from pathwalker_cli.cli import REFUSED, cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import InputError

@@ -24,9 +24,10 @@ from conftest import MadeSolution
 from fake_work import die, fake_work
 from pathwalker_cli.case import Case, load_case
 from pathwalker_cli.cli import cli
-from pathwalker_cli.commands.batch_progress import BatchProgress
+from pathwalker_cli.commands.progress import BatchProgress
 from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
+from pathwalker_cli.io import processes
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.patient import load_patient
@@ -488,7 +489,7 @@ def test_a_worker_that_dies_loses_only_its_own_case(tmp_path: Path) -> None:
 def test_workers_that_cannot_begin_fail_every_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(local, "prepare_worker", die)
+    monkeypatch.setattr(processes, "prepare_worker", die)
     case = load_case("mapd-barefoot")
     tasks = [Task(str(i), case, str(tmp_path)) for i in range(9)]
     results = dict(LocalPool(4).run(tasks, fake_work))

@@ -13,9 +13,9 @@ import yaml
 from click.testing import CliRunner, Result
 
 from made_c3d import write_c3d
-from pathwalker_cli.checking.expect import FIXED, MEASURED, expected
+from pathwalker_cli.checking.consistency import odd_patient
 from pathwalker_cli.checking.kinds import check_file
-from pathwalker_cli.checking.plausible import odd_patient
+from pathwalker_cli.checking.prediction import FIXED, MEASURED, expected
 from pathwalker_cli.checking.report import checked_lines
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config, smoke_version

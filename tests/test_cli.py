@@ -80,7 +80,7 @@ def test_help_and_version_import_nothing_heavy(tmp_path: Path, words: list[str])
 
 def test_help_lists_every_command_as_its_own_help_begins() -> None:
     text = " ".join(run("--help").output.split())
-    for name, (_, _, line) in COMMANDS.items():
+    for name, (_, line) in COMMANDS.items():
         assert f"{name} {line}" in text
         result = run(name, "--help")
         assert result.exit_code == 0, result.output

@@ -436,7 +436,7 @@ def test_a_clock_that_jumps_back_changes_no_result_but_the_date(
 
 def test_nothing_reads_the_clock_of_the_wall_but_for_dates() -> None:
     package = Path(atomic.__file__).parent.parent
-    told = {"results/versions.py", "reproduce/pipeline.py", "report/runs.py"}
+    told = {"versions.py", "reproduce/pipeline.py", "report/runs.py"}
     found = {
         str(path.relative_to(package))
         for path in package.rglob("*.py")
@@ -451,7 +451,7 @@ POOL = """
 import os, signal, sys, time
 from pathlib import Path
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.io.processes import called_elsewhere
+from pathwalker_cli.io.processes import results_of_calls
 
 def work(seconds):
     if seconds < 0:
@@ -462,7 +462,7 @@ if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start jobs deaf
     print("begun", flush=True)
     try:
-        list(called_elsewhere(work, [(float(word),) for word in sys.argv[1:]], 2))
+        list(results_of_calls(work, [(float(word),) for word in sys.argv[1:]], 2))
     except KeyboardInterrupt:
         print("stopped", flush=True)
     except NotConvergedError as error:

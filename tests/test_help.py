@@ -18,7 +18,7 @@ from click.testing import CliRunner, Result
 from conftest import MadeSolution
 from pathwalker_cli.checking.kinds import KINDS
 from pathwalker_cli.cli import COMMANDS, GROUPS, cli
-from pathwalker_cli.commands import complete, neighbour_study
+from pathwalker_cli.commands import complete
 from pathwalker_cli.commands.complete import (
     complete_configs,
     complete_keys,
@@ -27,6 +27,7 @@ from pathwalker_cli.commands.complete import (
     complete_runs,
 )
 from pathwalker_cli.commands.examples import EXAMPLES
+from pathwalker_cli.commands.studies import StudyCall
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.nlp.watch import ProgressReport
@@ -287,16 +288,14 @@ def test_a_study_whose_base_fails_says_so(here: Path, monkeypatch: pytest.Monkey
     def fail(*_: Any) -> None:
         raise NotConvergedError("mapd-orthosis, on which the study stands, did not converge")
 
+    monkeypatch.setattr(StudyCall, "base", fail)
     for name in ("sensitivity", "landscape", "tradeoff"):
-        module = __import__(f"pathwalker_cli.commands.{name}", fromlist=[name])
-        monkeypatch.setattr(module, "base_of", fail)
         result = run(name, name, "--json")
         assert result.exit_code == 1
         content = json.loads(result.stdout)
         assert content["converged"] is False
         assert "on which the study stands" in content["message"]
         assert "on which the study stands" in result.stderr
-    assert neighbour_study.base_of is not fail
 
 
 def test_inverse_dynamics_prints_one_document(here: Path) -> None:

@@ -64,7 +64,6 @@ CONFINED = {
         "evaluation.figures",
         "report.figures",
         "reproduce.figures",
-        "reproduce.muscle_figures",
         "studies.landscape.figures",
         "studies.sensitivity.figures",
         "studies.perturbation.figures",
@@ -77,7 +76,7 @@ CONFINED = {
     "dask_jobqueue": ("studies.batch.cluster",),
     "distributed": ("studies.batch.cluster",),
     "ezc3d": ("io",),
-    "pebble": ("studies.batch.local",),
+    "pebble": ("io.processes", "studies.batch.local"),
     "yaml": ("io",),
 }
 """Libraries and the parts of the package that may import them."""

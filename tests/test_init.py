@@ -15,19 +15,19 @@ from pydantic import BaseModel
 
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
+from pathwalker_cli.inverse.patient_update import with_block
 from pathwalker_cli.inverse.plates import plate_channels, plate_load
 from pathwalker_cli.inverse.process import process_trial
 from pathwalker_cli.inverse.study import load_inverse_dynamics, load_inverse_kinematics
 from pathwalker_cli.io.c3d import ForcePlate
 from pathwalker_cli.io.commented_yaml import entries, reasons
 from pathwalker_cli.io.fields import Sides
-from pathwalker_cli.io.yaml_blocks import with_block
 from pathwalker_cli.model.healthy import healthy_child, healthy_strength
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient
 from pathwalker_cli.starter import example
 from pathwalker_cli.starter.child import made_child
-from pathwalker_cli.starter.comments import WIDTH
+from pathwalker_cli.starter.configs import WIDTH
 from pathwalker_cli.starter.files import explained_keys, folder_files, next_steps
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.landscape.study import LandscapeStudy

@@ -82,7 +82,9 @@ def test_a_new_measure_stands_in_every_table_of_runs(runs: list[Path], tmp_path:
     assert [*json.loads(found.stdout)["metrics"][KEY]["values"].values()] == values
     section = gait_section(read_runs(runs), ())
     assert "Froude number" in [row.cells[0] for row in section.tables[0].rows]
-    case = cast(BatchCase, SimpleNamespace(name="c", patient="p", problem="m", values={}, variant=""))
+    case = cast(
+        BatchCase, SimpleNamespace(name="c", patient="p", problem="m", values={}, variant="")
+    )
     table = CaseTable([case])
     cells = table.row(case, "converged", metrics_in(runs[0]))
     assert dict(zip(table.header, cells, strict=True))[KEY] == f"{values[0]:.9g}"

@@ -25,10 +25,9 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.inverse.study import load_inverse_dynamics
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report import figures
-from pathwalker_cli.report.build import page_of
 from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
 from pathwalker_cli.report.gait_page import gait_page
-from pathwalker_cli.report.html import page_html
+from pathwalker_cli.report.html import page_html, page_of
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.springs import recommended, spring_section, verdict_words
 from pathwalker_cli.stride.measures import measures_in

@@ -25,9 +25,8 @@ from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.reproduce import pipeline
 from pathwalker_cli.reproduce.comparison import Ours, Row
 from pathwalker_cli.reproduce.figures import save_paper_figures
-from pathwalker_cli.reproduce.inverse_study import inverse_config, inverse_result
-from pathwalker_cli.reproduce.plan import ORDER, SEVERAL, planned_studies
-from pathwalker_cli.reproduce.results import Results, evaluated
+from pathwalker_cli.reproduce.pipeline import ORDER, SEVERAL, planned_studies
+from pathwalker_cli.reproduce.results import Results, evaluated, inverse_config, inverse_result
 from pathwalker_cli.reproduce.words import deviation, label, ours_text, printed, subject
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.studies import run as study_run
@@ -246,13 +245,13 @@ def test_inverse_dynamics_is_kept_until_something_changes(tmp_path: Path) -> Non
     config = inverse_config("default", None)
     assert config is not None
     file = tmp_path / "default.json"
-    first, kept = inverse_result(config, file, lambda _: None)
+    first, kept = inverse_result(config, file)
     assert not kept
-    assert inverse_result(config, file, lambda _: None) == (first, True)
+    assert inverse_result(config, file) == (first, True)
     file.write_text(file.read_text(encoding="utf-8")[:-20], encoding="utf-8")
-    assert inverse_result(config, file, lambda _: None) == (first, False)
+    assert inverse_result(config, file) == (first, False)
     other = config.model_copy(update={"motion_cutoff": 8.0})
-    assert not inverse_result(other, file, lambda _: None)[1]
+    assert not inverse_result(other, file)[1]
 
 
 @pytest.mark.parametrize(

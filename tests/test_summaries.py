@@ -11,8 +11,8 @@ import pytest
 
 from conftest import MadeSolution
 from pathwalker_cli.errors import DataError, InputError
-from pathwalker_cli.report.build import page_of
 from pathwalker_cli.report.folders import STUDIES, Kind, studies_near
+from pathwalker_cli.report.html import page_of
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.results import run_folder

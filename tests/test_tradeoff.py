@@ -17,7 +17,7 @@ from click.testing import CliRunner
 from made_neighbours import LIMIT, Fails, MadeResolver, made_measures, made_run, speed
 from pathwalker_cli.case import load_case
 from pathwalker_cli.cli import cli
-from pathwalker_cli.commands import tradeoff as command
+from pathwalker_cli.commands.studies import StudyCall
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.studies import neighbours
@@ -248,7 +248,7 @@ def test_the_command_writes_everything(
     made: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made()
-    monkeypatch.setattr(command, "base_of", lambda *_: made_run(tmp_path))
+    monkeypatch.setattr(StudyCall, "base", lambda *_: made_run(tmp_path))
     words = ("tradeoff", "--out", tmp_path / "out", "--set", *FOUR)
     done = run(*words)
     assert done.exit_code == 0, done.output

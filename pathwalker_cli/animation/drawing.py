@@ -115,11 +115,11 @@ class View:
 
 def drawing(frames: GaitFrames) -> Drawing:
     """Return what is drawn of a stride."""
-    worn = frames.condition == "orthosis"
+    with_orthosis = frames.condition == "orthosis"
     points = dict(frames.points)
-    if worn:
+    if with_orthosis:
         points |= _spring_ends(frames.points)
-    left, right = (_leg(points, side, worn) for side in ("left", "right"))
+    left, right = (_leg(points, side, with_orthosis) for side in ("left", "right"))
     return Drawing(
         frames=frames,
         points=points,
@@ -159,7 +159,7 @@ def _placed(outline: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarr
     return start + outline[:, :1] * way + outline[:, 1:] * left
 
 
-def _leg(points: Mapping[str, np.ndarray], side: Side, worn: bool) -> tuple[Shape, ...]:
+def _leg(points: Mapping[str, np.ndarray], side: Side, with_orthosis: bool) -> tuple[Shape, ...]:
     """Return the shapes of a leg, from back to front."""
     s = SUFFIX[side]
     chain = ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}")
@@ -171,7 +171,7 @@ def _leg(points: Mapping[str, np.ndarray], side: Side, worn: bool) -> tuple[Shap
         Shape("spring", f"spring_top_{s}", f"spring_foot_{s}", _zigzag(), side=side),
     )
     muscles = _muscles(points, ("hip", "knee", "ankle"), f"_{s}", side)
-    return (foot, *bones, *(orthosis if worn else ()), *muscles)
+    return (foot, *bones, *(orthosis if with_orthosis else ()), *muscles)
 
 
 def _trunk(points: Mapping[str, np.ndarray]) -> tuple[Shape, ...]:

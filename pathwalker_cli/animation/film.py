@@ -139,9 +139,9 @@ def _ffmpeg() -> str:
     Raises:
         DataError: If there is none.
     """
-    found = shutil.which("ffmpeg")
-    if found is not None:
-        return found
+    program = shutil.which("ffmpeg")
+    if program is not None:
+        return program
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
 

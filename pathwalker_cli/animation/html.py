@@ -60,7 +60,7 @@ def html_page(runs: Sequence[GaitFrames]) -> str:
         spring=SPRING_COLOUR,
         view=view,
         panels=[_panel(each) for each in drawings],
-        worn=any(frames.condition == "orthosis" for frames in runs),
+        with_orthosis=any(frames.condition == "orthosis" for frames in runs),
         data={
             "colours": ACTIVATION_COLOURS,
             "half_width": view.half_width,

@@ -99,9 +99,9 @@ def arrow_look(side: Side) -> Look:
 
 def subtitle(frames: GaitFrames) -> str:
     """Return in one line who walks how fast."""
-    worn = "with orthoses" if frames.condition == "orthosis" else "barefoot"
+    condition = "with orthoses" if frames.condition == "orthosis" else "barefoot"
     return (
-        f"{frames.patient}, {worn} ({frames.problem}): {frames.walking_speed:.2f} m/s, "
+        f"{frames.patient}, {condition} ({frames.problem}): {frames.walking_speed:.2f} m/s, "
         f"stride {frames.distance:.2f} m in {frames.duration:.2f} s"
     )
 

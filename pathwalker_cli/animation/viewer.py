@@ -106,7 +106,7 @@ def _parts(walker: Walker) -> Iterator[_Part]:
     yield "head", "lumbar", coal.Sphere(radius), pin.SE3(np.eye(3), head), dark
 
 
-def _leg(points: dict[str, np.ndarray], side: Side, worn: bool) -> Iterator[_Part]:
+def _leg(points: dict[str, np.ndarray], side: Side, with_orthosis: bool) -> Iterator[_Part]:
     """Yield the parts of a leg."""
     s, across, colour = SUFFIX[side], np.array([0.0, _ACROSS[side], 0.0]), _grey(_SHADES[side])
     knee = _between(points, f"hip_{s}", f"knee_{s}")
@@ -116,11 +116,11 @@ def _leg(points: dict[str, np.ndarray], side: Side, worn: bool) -> Iterator[_Par
     lines = [
         ("thigh", "hip", np.zeros(3), knee, _THIGH, colour),
         ("shank", "knee", np.zeros(3), ankle, _SHANK, colour),
-        ("sole", "ankle", heel, toe, _FOOT, _BLUE if worn else colour),
+        ("sole", "ankle", heel, toe, _FOOT, _BLUE if with_orthosis else colour),
         ("heel", "ankle", np.zeros(3), heel, _FOOT, colour),
         ("instep", "ankle", np.zeros(3), toe, _FOOT, colour),
     ]
-    if worn:
+    if with_orthosis:
         lines.append(("shell", "knee", 0.54 * ankle, 0.86 * ankle, _SHELL, _BLUE))
     for name, joint, start, end, radius, shade in lines:
         shape, place = _capsule(start + across, end + across, radius)

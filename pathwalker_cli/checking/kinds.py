@@ -8,15 +8,35 @@ from typing import Any, Final, NamedTuple
 
 from pydantic import BaseModel
 
-from pathwalker_cli.checking import recorded, studies
+from pathwalker_cli.checking import studies
+from pathwalker_cli.checking.consistency import odd_orthosis
+from pathwalker_cli.checking.patient import (
+    orthosis_content,
+    patient_content,
+    patient_remarks,
+    patient_rows,
+)
 from pathwalker_cli.checking.prediction import check_prediction
-from pathwalker_cli.checking.report import Changes, Checked
+from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.config import StudyConfig, config_content, find_config
-from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.inverse.markers import MarkerSet
-from pathwalker_cli.inverse.study import InverseDynamicsConfig, InverseKinematicsConfig
-from pathwalker_cli.patient import OrthosisData, Patient, shipped_patients
+from pathwalker_cli.conventions import CONDITIONS
+from pathwalker_cli.errors import ConfigError, placed
+from pathwalker_cli.inverse.evaluate import require_trials
+from pathwalker_cli.inverse.markers import MarkerSet, load_marker_set, marker_points
+from pathwalker_cli.inverse.study import (
+    InverseDynamicsConfig,
+    InverseKinematicsConfig,
+    RecordedConfig,
+    load_inverse_dynamics,
+    load_inverse_kinematics,
+)
+from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording
+from pathwalker_cli.io.recordings import read_recording, recording_names
+from pathwalker_cli.io.yaml_file import load_yaml
+from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.patient import OrthosisData, Patient, load_patient, shipped_patients
 from pathwalker_cli.problems import problem_named
+from pathwalker_cli.results.text import orthosis_rows
 from pathwalker_cli.studies.batch.schema import BatchStudy
 from pathwalker_cli.studies.landscape.study import LandscapeStudy
 from pathwalker_cli.studies.perturbation.study import PerturbationStudy
@@ -24,7 +44,117 @@ from pathwalker_cli.studies.sensitivity.study import SensitivityStudy
 from pathwalker_cli.studies.tradeoff.study import TradeoffStudy
 from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy
 
-__all__ = ["KINDS", "Kind", "another_kind", "check_file"]
+__all__ = ["KINDS", "another_kind", "check_file", "check_orthosis"]
+
+
+def check_kinematics(path: str, changes: Changes = ()) -> Checked:
+    """Return what `ik` would do."""
+    config = load_inverse_kinematics(path, changes)
+    with placed(path):
+        patient = load_patient(config.patient)
+        trials = _c3d(config, patient)
+    return _recorded_study(path, "inverse kinematics", patient, trials, "C3D files")
+
+
+def check_dynamics(path: str, changes: Changes = ()) -> Checked:
+    """Return what `id` would do."""
+    config: InverseDynamicsConfig = load_inverse_dynamics(path, changes)
+    with placed(path):
+        patient = load_patient(config.patient)
+        require_trials(config, patient)
+        if config.source == "c3d":
+            trials = _c3d(config, patient)
+            return _recorded_study(path, "inverse dynamics", patient, trials, "C3D files")
+        trials = {c: list(recording_names(patient, c)) for c in config.conditions}
+        for condition in config.conditions:
+            for name in trials[condition]:
+                read_recording(patient, condition, name)
+    return _recorded_study(
+        path, "inverse dynamics", patient, trials, "recordings beside the patient"
+    )
+
+
+def check_markers(path: str, changes: Changes = ()) -> Checked:
+    """Return what a marker set holds."""
+    _require_none(changes, path)
+    marker_set: MarkerSet = load_marker_set(path)
+    with placed(path):
+        patient = load_patient("sreenivasa2017-patient")
+        points = {c: marker_points(marker_set, patient, c) for c in CONDITIONS}
+    rows: list[Row] = []
+    for condition, own in points.items():
+        markers = list(dict.fromkeys(point.marker for point in own))
+        text = f"{len(markers)} markers at {len(own)} points: {', '.join(markers)}"
+        rows.append((condition, text))
+    names = {c: sorted({point.marker for point in own}) for c, own in points.items()}
+    return Checked(path, "marker set", tuple(rows), {"markers": names})
+
+
+def check_patient_file(path: str, changes: Changes = ()) -> Checked:
+    """Return who a patient is; the models of both conditions are built."""
+    _require_none(changes, path)
+    patient = load_patient(path)
+    with placed(path):
+        if patient.strengths is not None:
+            build_walker(patient, "barefoot")
+            if patient.orthosis is not None:
+                build_walker(patient, "orthosis")
+    recordings = {c: recording_names(patient, c) for c in CONDITIONS}
+    rows = [
+        *patient_rows(patient),
+        *(orthosis_rows(patient.orthosis) if patient.orthosis else [("orthosis", "none")]),
+        ("recorded", ", ".join(patient.recorded) or "nothing"),
+        ("recordings", ", ".join(f"{len(n)} {c}" for c, n in recordings.items() if n) or "none"),
+    ]
+    content = {"patient": patient_content(patient), "orthosis": orthosis_content(patient)}
+    missing = ["strengths are not given: nothing can be predicted yet"] * (
+        patient.strengths is None
+    )
+    return Checked(path, "patient", tuple(rows), content, (*missing, *patient_remarks(patient)))
+
+
+def check_orthosis(path: str, changes: Changes = ()) -> Checked:
+    """Return what an orthosis is."""
+    _require_none(changes, path)
+    orthosis = load_yaml(path, OrthosisData, ConfigError)
+    content = {"orthosis": orthosis.model_dump(mode="json")}
+    return Checked(
+        path, "orthosis", tuple(orthosis_rows(orthosis)), content, (*odd_orthosis(orthosis),)
+    )
+
+
+def _require_none(changes: Changes, path: str) -> None:
+    """Refuse overrides of what is no config."""
+    if changes:
+        raise ConfigError(
+            f"overrides keys of configs, and {path} is none",
+            where=f"--set {changes[0]}",
+            mend="check that file in a call of its own",
+        )
+
+
+def _c3d(config: RecordedConfig, patient: Patient) -> dict[str, list[str]]:
+    """Return the C3D files of a study by condition, each looked into."""
+    markers = load_marker_set(config.markers)
+    trials: dict[str, list[str]] = {}
+    with placed("c3d"):
+        files = {c: c3d_files(config.c3d.of(c)) for c in config.recorded_conditions}
+    for condition, paths in files.items():
+        names = [point.marker for point in marker_points(markers, patient, condition)]
+        for file in paths:
+            checked_recording(file, names, patient.height)
+        trials[condition] = [file.stem for file in paths]
+    return trials
+
+
+def _recorded_study(
+    path: str, kind: str, patient: Patient, trials: dict[str, list[str]], where: str
+) -> Checked:
+    rows = [*patient_rows(patient)]
+    rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in trials.items() if n]
+    content: dict[str, Any] = {"patient": patient_content(patient), "trials": trials}
+    return Checked(path, kind, tuple(rows), content, patient_remarks(patient))
+
 
 Check = Callable[[str, Changes], Checked]
 
@@ -51,17 +181,17 @@ KINDS: Final[dict[str, Kind]] = {
     "landscape": Kind(LandscapeStudy, studies.check_landscape, "pathwalker landscape"),
     "tradeoff": Kind(TradeoffStudy, studies.check_tradeoff, "pathwalker tradeoff"),
     "cohort": Kind(BatchStudy, studies.check_batch, "pathwalker batch"),
-    "inverse-kinematics": Kind(InverseKinematicsConfig, recorded.check_kinematics, "pathwalker ik"),
-    "inverse-dynamics": Kind(InverseDynamicsConfig, recorded.check_dynamics, "pathwalker id"),
+    "inverse-kinematics": Kind(InverseKinematicsConfig, check_kinematics, "pathwalker ik"),
+    "inverse-dynamics": Kind(InverseDynamicsConfig, check_dynamics, "pathwalker id"),
     "markers": Kind(
         MarkerSet,
-        recorded.check_markers,
+        check_markers,
         "--markers of pathwalker import, and the key markers of configs of ik and id",
     ),
     "patient": Kind(
-        Patient, recorded.check_patient_file, "the key patient of a config, or --set patient=FILE"
+        Patient, check_patient_file, "the key patient of a config, or --set patient=FILE"
     ),
-    "orthosis": Kind(OrthosisData, recorded.check_orthosis, "the key orthosis of a patient's file"),
+    "orthosis": Kind(OrthosisData, check_orthosis, "the key orthosis of a patient's file"),
 }
 """Every kind of file by its name."""
 
@@ -97,17 +227,17 @@ def another_kind(path: str, kind: str) -> ConfigError | None:
         kind: The kind that it is not accepted as.
     """
     try:
-        found = _kind_of(path)
+        actual = _kind_of(path)
     except ConfigError:
         return None
-    if found == kind:
+    if actual == kind:
         return None
-    a = "an" if found[0] in "aeiou" else "a"
+    a = "an" if actual[0] in "aeiou" else "a"
     return ConfigError(
-        f"is {a} {found} file",
+        f"is {a} {actual} file",
         where=path,
         allowed=f"a file for {KINDS[kind].taken_by}",
-        mend=f"this file is for {KINDS[found].taken_by}",
+        mend=f"this file is for {KINDS[actual].taken_by}",
     )
 
 
@@ -135,10 +265,10 @@ def _kind(mapping: Mapping[str, Any], source: Path, where: str) -> str:
         return str(mapping["study"])
     known = {name: len(mapping.keys() & _keys(model)) for name, (model, _, _) in KINDS.items()}
     most = max(known.values())
-    found = [name for name, count in known.items() if count == most]
-    named = [name for name in found if name in source.stem]
-    if len(named) == 1 or len(found) == 1:
-        return (named or found)[0]
+    likely = [name for name, count in known.items() if count == most]
+    named = [name for name in likely if name in source.stem]
+    if len(named) == 1 or len(likely) == 1:
+        return (named or likely)[0]
     shown = ", ".join(mapping) or "none"
     raise ConfigError(
         f"its keys ({shown}) do not tell what it is",

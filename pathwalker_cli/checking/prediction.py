@@ -2,41 +2,114 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.checking.expect import expected
-from pathwalker_cli.checking.plausible import odd_patient
+from pathwalker_cli.checking.consistency import contradictions, oddities
+from pathwalker_cli.checking.patient import (
+    orthosis_content,
+    patient_content,
+    patient_remarks,
+    walker_rows,
+)
 from pathwalker_cli.checking.report import Changes, Checked, Row
-from pathwalker_cli.checking.sense import contradictions, oddities
-from pathwalker_cli.config import load_config
+from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.config.values import changed_values
 from pathwalker_cli.conventions import CONDITIONS, STIFFNESSES
 from pathwalker_cli.errors import DataError, placed
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.recordings import recording_names
-from pathwalker_cli.model.healthy import healthy_strength
-from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient.blocks import Strengths
 from pathwalker_cli.results.run_folder import ENTRIES, check_target, default_folder
-from pathwalker_cli.results.text import notes_together, orthosis_rows
 from pathwalker_cli.studies.batch.checks import check_patient
 
-__all__ = [
-    "check_prediction",
-    "described",
-    "orthosis_content",
-    "patient_content",
-    "patient_remarks",
-    "patient_rows",
-    "ready_solver",
-    "walker_rows",
-]
+__all__ = ["FIXED", "MEASURED", "check_prediction", "described", "expected", "ready_solver"]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One measured solve.
+
+    Args:
+        iterations: Iterations in all.
+        seconds: CPU seconds from the shell, imports, tables and figures included.
+    """
+
+    iterations: int
+    seconds: float
+
+
+MEASURED: Final[dict[str, tuple[Measured, Measured]]] = {
+    "mapd-barefoot": (Measured(183, 13.1), Measured(222, 12.3)),
+    "mapd-healthy": (Measured(145, 10.4), Measured(162, 8.8)),
+    "mapd-orthosis": (Measured(311, 19.1), Measured(405, 23.3)),
+    "mapd-ws-orthosis": (Measured(324, 20.1), Measured(596, 38.7)),
+    "ls-barefoot": (Measured(69, 7.4), Measured(127, 9.8)),
+}
+"""By problem: on 64 intervals without refinement, and refined from 48 intervals on."""
+
+FIXED: Final = 4.0
+"""CPU seconds of imports, figures and tables, whatever is solved."""
+
+_INTERVALS: Final = (64, 48)
+_DEGREE: Final = 3
+"""Intervals that the two measured solves began with, and their collocation points."""
+
+_SPREAD: Final = (0.6, 2.0)
+"""Shares of the measured seconds between which other children and starts end: those of the
+tests' ten-year-old are 1.6 times those of the shipped patient, other starts need up to 1.9."""
+
+_VERDICT: Final = 2.0
+"""Factor by which judging the springs makes a solve with orthoses longer."""
+
+
+@dataclass(frozen=True)
+class Seconds:
+    """CPU seconds on the machine of docs/performance.md.
+
+    Args:
+        likely: As the shipped patient would take.
+        least: Few iterations.
+        most: Many iterations.
+        iterations: Iterations that `likely` stands for.
+    """
+
+    likely: float
+    least: float
+    most: float
+    iterations: int
+
+    def __str__(self) -> str:
+        """Say it for people."""
+        return (
+            f"about {self.likely:.0f} s ({self.least:.0f} to {self.most:.0f}) of one core on the "
+            f"machine of docs/performance.md, {self.iterations} iterations"
+        )
+
+
+def expected(config: StudyConfig, intervals: int) -> Seconds:
+    """Return how long a solve may take.
+
+    Args:
+        config: The study.
+        intervals: Intervals of its first mesh; unknowns, and seconds per iteration, are in
+            proportion to their collocation points.
+    """
+    refined = config.mesh.refinements > 0
+    measured = MEASURED[config.problem][refined]
+    size = intervals * config.mesh.degree / (_INTERVALS[refined] * _DEGREE)
+    verdict = _VERDICT if config.verdict and config.condition == "orthosis" else 1.0
+    solve = (measured.seconds - FIXED) * size * config.starts * verdict
+    return Seconds(
+        FIXED + solve,
+        FIXED + _SPREAD[0] * solve,
+        FIXED + _SPREAD[1] * solve,
+        measured.iterations * config.starts,
+    )
 
 
 def check_prediction(path: str, changes: Changes = (), problem: str = "") -> Checked:
@@ -87,143 +160,74 @@ def _solver(case: Case) -> GaitSolver:
 
 def described(solver: GaitSolver, path: str) -> Checked:
     """Return what a solver would solve."""
-    config, walker = solver.config, solver.walker
-    patient = walker.patient
+    content, seconds = _content(solver)
+    notes = (*oddities(solver), *patient_remarks(solver.walker.patient))
+    return Checked(path, "prediction", tuple(_rows(solver, content, seconds)), content, notes)
+
+
+def _content(solver: GaitSolver) -> tuple[dict[str, Any], Seconds]:
+    """Return what would be solved as plain values, and the time to expect."""
+    config, walker, patient = solver.config, solver.walker, solver.walker.patient
     durations = solver.stride.durations[: len(solver.gait.phases)]
-    program = CollocationProgram(
-        solver.blocks, solver.prediction, meshing.first(durations, config.mesh)
-    )
+    mesh = meshing.first(durations, config.mesh)
+    program = CollocationProgram(solver.blocks, solver.prediction, mesh)
     intervals = sum(len(mesh) - 1 for mesh in program.meshes)
-    unknowns, rows = program.size, program.rows
-    seconds = expected(config, intervals)
-    weights = _weights(solver)
-    names = [phase.name for phase in solver.gait.phases]
-    springs, mirrored = _free_springs(solver), config.half_cycle
-    shooting = config.transcription == "multiple-shooting"
-    folder = default_folder(config, patient.id)
-    recordings = {c: recording_names(patient, c) for c in CONDITIONS}
-    changed = {
-        key: f"{_short(now)} (default {_short(usual)})"
-        for key, (now, usual) in changed_values(config).items()
-    }
-    bounds = _bounds(solver)
-    table: list[Row] = [
-        ("problem", f"{config.problem}, {walker.condition}"),
-        *walker_rows(walker),
-        ("phases", f"{len(names)}: {', '.join(names)}" + "; then their mirror image" * mirrored),
-        ("start", solver.stride.name + (f", {config.starts} starts" * (config.starts > 1))),
-        (
-            "size",
-            f"{intervals} intervals of degree {config.mesh.degree} to begin with, {unknowns:,} "
-            f"unknowns, {rows:,} rows; free parameters: {len(springs)}",
-        ),
-        *(("bounds", f"{name}: {text}") for name, text in bounds.items()),
-        *(("cost, weights", f"{name.replace('_', ' ')}: {value:g}") for name, value in weights),
-        ("not the default", "; ".join(f"{k}: {v}" for k, v in changed.items()) or "nothing"),
-        ("recordings", _recordings(recordings)),
-        ("output", _output(folder)),
-        ("expected time", str(seconds) + ("; shooting takes minutes more" if shooting else "")),
-    ]
-    content: dict[str, Any] = {
+    seconds, folder = expected(config, intervals), default_folder(config, patient.id)
+    content = {
         "problem": config.problem,
         "condition": walker.condition,
         "patient": patient_content(patient),
         "orthosis": orthosis_content(patient) if walker.orthosis is not None else None,
-        "phases": names,
+        "phases": [phase.name for phase in solver.gait.phases],
         "start": solver.stride.name,
         "starts": config.starts,
         "intervals": intervals,
-        "unknowns": unknowns,
-        "rows": rows,
-        "free_parameters": springs,
-        "bounds": bounds,
-        "cost_weights": dict(weights),
-        "not_default": changed,
-        "recordings": {condition: list(found) for condition, found in recordings.items()},
+        "unknowns": program.size,
+        "rows": program.rows,
+        "free_parameters": _free_springs(solver),
+        "bounds": _bounds(solver),
+        "cost_weights": _weights(solver),
+        "not_default": {
+            key: f"{_short(now)} (default {_short(usual)})"
+            for key, (now, usual) in changed_values(config).items()
+        },
+        "recordings": {c: list(recording_names(patient, c)) for c in CONDITIONS},
         "output": str(folder),
         "output_state": _output(folder),
         "expected_seconds": {
-            "likely": round(seconds.likely, 1),
-            "least": round(seconds.least, 1),
-            "most": round(seconds.most, 1),
+            name: round(getattr(seconds, name), 1) for name in ("likely", "least", "most")
         },
     }
-    notes = (*oddities(solver), *patient_remarks(patient))
-    return Checked(path, "prediction", tuple(table), content, notes)
+    return content, seconds
 
 
-def walker_rows(walker: Walker) -> list[Row]:
-    """Return who walks, and what is worn."""
-    rows = patient_rows(walker.patient)
-    if walker.orthosis is not None:
-        rows += orthosis_rows(walker.patient.require_orthosis())
-    return rows
+def _rows(solver: GaitSolver, content: Mapping[str, Any], seconds: Seconds) -> Iterator[Row]:
+    """Yield the same for people, label and text."""
+    config, walker, names = solver.config, solver.walker, content["phases"]
+    yield "problem", f"{config.problem}, {walker.condition}"
+    yield from walker_rows(walker)
+    mirrored = "; then their mirror image" * config.half_cycle
+    yield "phases", f"{len(names)}: {', '.join(names)}{mirrored}"
+    yield "start", content["start"] + (f", {config.starts} starts" * (config.starts > 1))
+    yield (
+        "size",
+        f"{content['intervals']} intervals of degree {config.mesh.degree} to begin with, "
+        f"{content['unknowns']:,} unknowns, {content['rows']:,} rows; free parameters: "
+        f"{len(content['free_parameters'])}",
+    )
+    yield from (("bounds", f"{name}: {text}") for name, text in content["bounds"].items())
+    for name, weight in content["cost_weights"].items():
+        yield "cost, weights", f"{name.replace('_', ' ')}: {weight:g}"
+    changed = "; ".join(f"{key}: {text}" for key, text in content["not_default"].items())
+    yield "not the default", changed or "nothing"
+    recorded = ", ".join(f"{len(n)} {c}" for c, n in content["recordings"].items() if n)
+    yield "recordings", f"{recorded}, beside the patient's file" if recorded else "none"
+    yield "output", content["output_state"]
+    shooting = config.transcription == "multiple-shooting"
+    yield "expected time", str(seconds) + ("; shooting takes minutes more" if shooting else "")
 
 
-def patient_remarks(patient: Patient) -> tuple[str, ...]:
-    """Return what is unusual about a patient, then what was filled in."""
-    return (*odd_patient(patient), *notes_together(patient.notes))
-
-
-def orthosis_content(patient: Patient) -> dict[str, Any] | None:
-    """Return what is worn as plain values, in the units of the file."""
-    return patient.orthosis.model_dump(mode="json") if patient.orthosis is not None else None
-
-
-def patient_rows(patient: Patient) -> list[Row]:
-    """Return who a patient is."""
-    source = f", {_shown(patient.source)}" if patient.source else ""
-    rows = [
-        ("patient", f"{patient.id}{source}"),
-        (
-            "",
-            f"{patient.sex}, {patient.age:g} years, {patient.body_mass:g} kg, {patient.height:g} m",
-        ),
-    ]
-    shares = strength_shares(patient)
-    sides = [
-        f"{name.replace('_', ' ')} {' / '.join(f'{100 * share:.0f}' for share in values)} %"
-        for name, values in shares.items()
-    ]
-    if sides:
-        text = "right / left, of a healthy child of this mass and height: "
-        rows.append(("strengths", text + ", ".join(sides)))
-    return rows
-
-
-def _shown(path: Path) -> Path:
-    """Return a path as seen from here where it lies below."""
-    here = Path.cwd()
-    return path.relative_to(here) if path.is_relative_to(here) else path
-
-
-def patient_content(patient: Patient) -> dict[str, Any]:
-    """Return who a patient is as plain values."""
-    return {
-        "id": patient.id,
-        "file": str(patient.source) if patient.source else None,
-        "sex": patient.sex,
-        "age": patient.age,
-        "body_mass": patient.body_mass,
-        "height": patient.height,
-        "strengths_of_healthy": {k: list(v) for k, v in strength_shares(patient).items()},
-    }
-
-
-def strength_shares(patient: Patient) -> dict[str, tuple[float, ...]]:
-    """Return strengths as shares of a healthy child's of the same size: right and left, or one."""
-    if patient.strengths is None:
-        return {}
-    found = {}
-    for name in Strengths.model_fields:
-        given = getattr(patient.strengths, name)
-        values = (given,) if isinstance(given, float) else (given.right, given.left)
-        whole = healthy_strength(name, patient.body_mass, patient.height)
-        found[name] = tuple(round(value / whole, 3) for value in values)
-    return found
-
-
-def _weights(solver: GaitSolver) -> list[tuple[str, float]]:
+def _weights(solver: GaitSolver) -> dict[str, float]:
     """Return the terms of the objective with their weights; those without any are left out."""
     weights = {name: value for name, value in vars(solver.weights).items() if name != "goals"}
     if not solver.config.fits:
@@ -236,8 +240,8 @@ def _weights(solver: GaitSolver) -> list[tuple[str, float]]:
         "fit": "squared distance from the recording",
         "excitation": "squared excitations",
     }
-    terms = [(named.get(name, name), value) for name, value in weights.items() if value]
-    return [*terms, *((f"goal {n}", v) for n, v in solver.config.cost.goals.items() if v)]
+    terms = {named.get(name, name): value for name, value in weights.items() if value}
+    return terms | {f"goal {n}": v for n, v in solver.config.cost.goals.items() if v}
 
 
 def _free_springs(solver: GaitSolver) -> list[str]:
@@ -251,23 +255,23 @@ def _free_springs(solver: GaitSolver) -> list[str]:
 def _bounds(solver: GaitSolver) -> dict[str, str]:
     """Return every bound with its reason; equal phase durations stand together."""
     config = solver.config.bounds
-    found: dict[str, str] = {}
+    bounds: dict[str, str] = {}
     durations: dict[str, list[str]] = {}
     for name, text in solver.bounds.sources.items():
         if name.startswith("duration of "):
             durations.setdefault(text, []).append(name.removeprefix("duration of "))
         else:
-            found[name] = text
+            bounds[name] = text
     for text, names in durations.items():
         key = "every phase" if len(durations) == 1 else ", ".join(names)
-        found[f"duration of {key}"] = text
-    found["distance"] = f"[{config.distance[0]:g}, {config.distance[1]:g}] m per stride, config"
-    found["joint speed"] = f"up to {config.joint_speed:g} rad/s, m/s, config"
-    found["friction"] = f"forward force up to {config.friction:g} times the vertical, config"
-    found["vertical force"] = f"at least {config.least_vertical_force:g} N per point, config"
-    found["height of points in the air"] = f"at least {config.least_height:g} m, config"
-    found["activations, excitations"] = "[0, 1], always"
-    return found
+        bounds[f"duration of {key}"] = text
+    bounds["distance"] = f"[{config.distance[0]:g}, {config.distance[1]:g}] m per stride, config"
+    bounds["joint speed"] = f"up to {config.joint_speed:g} rad/s, m/s, config"
+    bounds["friction"] = f"forward force up to {config.friction:g} times the vertical, config"
+    bounds["vertical force"] = f"at least {config.least_vertical_force:g} N per point, config"
+    bounds["height of points in the air"] = f"at least {config.least_height:g} m, config"
+    bounds["activations, excitations"] = "[0, 1], always"
+    return bounds
 
 
 def _short(value: Any) -> str:
@@ -278,11 +282,6 @@ def _short(value: Any) -> str:
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
     return str(value) or '""'
-
-
-def _recordings(found: Mapping[str, tuple[str, ...]]) -> str:
-    there = [f"{len(names)} {condition}" for condition, names in found.items() if names]
-    return f"{', '.join(there)}, beside the patient's file" if there else "none"
 
 
 def _output(folder: Path) -> str:

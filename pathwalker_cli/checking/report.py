@@ -1,4 +1,4 @@
-"""What a check found, as rows for people and as plain values."""
+"""The outcome of a check, as rows for the terminal and as plain values."""
 
 from __future__ import annotations
 

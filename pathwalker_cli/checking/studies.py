@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.checking.prediction import described, ready_solver, walker_rows
+from pathwalker_cli.checking.patient import walker_rows
+from pathwalker_cli.checking.prediction import described, ready_solver
 from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError, placed
@@ -48,9 +49,9 @@ def check_sensitivity(path: str, changes: Changes = ()) -> Checked:
     """Return what `sensitivity` would do."""
     study = load_study(path, SensitivityStudy, changes)
     solver = _base(study, path)
-    patient, worn = solver.walker.patient, solver.walker.orthosis is not None
+    patient, with_orthosis = solver.walker.patient, solver.walker.orthosis is not None
     with placed(path):
-        places = asked_places(study, solver.free, patient, worn)
+        places = asked_places(study, solver.free, patient, with_orthosis)
         for place in places[len(solver.free) :]:
             _check_place(place, patient)
     solves = 2 * len(study.check)
@@ -115,9 +116,9 @@ def check_batch(path: str, changes: Changes = ()) -> Checked:
     notes: list[str] = []
     seconds = 0.0
     for case in batch.cases:
-        found = described(ready_solver(case.study, f"{path}, case {case.name}"), path)
-        seconds += found.content["expected_seconds"]["likely"]
-        notes += [note for note in found.notes if note not in notes]
+        checked = described(ready_solver(case.study, f"{path}, case {case.name}"), path)
+        seconds += checked.content["expected_seconds"]["likely"]
+        notes += [note for note in checked.notes if note not in notes]
     patients = list(dict.fromkeys(case.patient for case in batch.cases))
     problems = list(dict.fromkeys(case.problem for case in batch.cases))
     rows: list[Row] = [

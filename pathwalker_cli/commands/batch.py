@@ -8,9 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs, set_option
-from pathwalker_cli.commands.json_output import json_option, print_json
-from pathwalker_cli.commands.kinds import meant_as
+from pathwalker_cli.commands.complete import complete_configs
+from pathwalker_cli.commands.options import (
+    json_option,
+    meant_as,
+    out_option,
+    print_json,
+    quiet_option,
+    set_option,
+)
 
 if TYPE_CHECKING:
     from pathwalker_cli.studies.batch.worker import Pool
@@ -20,13 +26,10 @@ __all__ = ["batch_command"]
 
 @click.command("batch")
 @click.argument("study", metavar="STUDY", shell_complete=complete_configs)
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder of runs and table; runs/ and the name of STUDY if left out. What is done there "
+@out_option(
+    "Folder of runs and table; runs/ and the name of STUDY if left out. What is done there "
     "already is kept.",
+    "-o",
 )
 @click.option(
     "--workers",
@@ -46,7 +49,7 @@ __all__ = ["batch_command"]
     help="Give up a case that takes longer. On this machine only.",
 )
 @set_option("Override a key of STUDY.")
-@click.option("--quiet", is_flag=True, help="Print errors only.")
+@quiet_option
 @json_option
 def batch_command(
     study: str,
@@ -65,7 +68,7 @@ def batch_command(
     with the same config is not solved again, so an interrupted call goes on where it was, and
     patients may be added. Exit codes: 0 all converged, 1 some case did not, 2 bad input.
     """
-    from pathwalker_cli.commands.batch_progress import BatchProgress
+    from pathwalker_cli.commands.progress import BatchProgress
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.studies.batch.cases import load_cases
     from pathwalker_cli.studies.batch.study import run_batch

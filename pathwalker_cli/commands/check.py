@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs, complete_problems, set_option
-from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.complete import complete_configs, complete_problems
+from pathwalker_cli.commands.options import json_option, print_json, set_option
 
 if TYPE_CHECKING:
     from pathwalker_cli.checking.report import Checked
@@ -51,13 +51,13 @@ def check_command(
     from pathwalker_cli.checking.report import checked_lines
     from pathwalker_cli.errors import InputError
 
-    found: list[Checked] = []
+    checked_files: list[Checked] = []
     entries: list[dict[str, Any]] = []
     failures: list[str] = []
     for path in configs:
         try:
-            found.append(check_file(path, problem or "", changes))
-            entries.append(found[-1].as_dict())
+            checked_files.append(check_file(path, problem or "", changes))
+            entries.append(checked_files[-1].as_dict())
         except InputError as error:
             sentence = str(error)
             failures.append(sentence if Path(path).name in sentence else f"{path}: {sentence}")
@@ -65,8 +65,10 @@ def check_command(
     if as_json:
         print_json({"ok": not failures, "configs": entries})
     else:
-        click.echo("\n\n".join("\n".join(checked_lines(checked)) for checked in found), nl=False)
-        click.echo("\n" * bool(found), nl=False)
+        click.echo(
+            "\n\n".join("\n".join(checked_lines(checked)) for checked in checked_files), nl=False
+        )
+        click.echo("\n" * bool(checked_files), nl=False)
     for sentence in failures:
         click.echo(f"Error: {sentence}", err=True)
     context.exit(_REFUSED if failures else 0)

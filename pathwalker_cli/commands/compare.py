@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathwalker_cli.commands.complete import runs_argument
-from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.options import json_option, out_option, print_json, runs_argument
 
 if TYPE_CHECKING:
+    from pathwalker_cli.evaluation.evaluate import Change, Evaluation
     from pathwalker_cli.report.compare import Comparison
-
-__all__ = ["compare_command"]
+    from pathwalker_cli.stride.stride import Stride
 
 
 @click.command("compare")
 @runs_argument()
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Folder for compare.csv, compare.json and figures; nothing is written if left out.",
+@out_option(
+    "Folder for compare.csv, compare.json and figures; nothing is written if left out.", "-o"
 )
 @json_option
 def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> None:
@@ -39,20 +35,20 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
 
     if len(runs) < 2:
         raise DataError("is one run", where=str(runs[0]), allowed="two runs or more")
-    found = compare_runs(runs)
+    comparison = compare_runs(runs)
     if out is not None:
-        _write(out, found)
+        _write(out, comparison)
     if as_json:
-        print_json(comparison_content(found))
+        print_json(comparison_content(comparison))
         return
-    click.echo("\n".join(comparison_lines(found)))
-    for note in found.notes:
+    click.echo("\n".join(comparison_lines(comparison)))
+    for note in comparison.notes:
         click.echo(fill(f"note: {note}", 80, subsequent_indent="      "))
     if out is not None:
         click.echo(f"\nWritten to {out}")
 
 
-def _write(out: Path, found: Comparison) -> None:
+def _write(out: Path, comparison: Comparison) -> None:
     """Write tables and figures, all or none."""
     from pathwalker_cli.evaluation.curves import traces
     from pathwalker_cli.evaluation.figures import save_overlays
@@ -61,6 +57,111 @@ def _write(out: Path, found: Comparison) -> None:
     from pathwalker_cli.report.compare import comparison_content, write_comparison_csv
 
     with staged_folder(out) as folder:
-        write_json(folder / "compare.json", comparison_content(found))
-        write_comparison_csv(folder / "compare.csv", found)
-        save_overlays(traces(found.gaits, found.names), folder / "figures")
+        write_json(folder / "compare.json", comparison_content(comparison))
+        write_comparison_csv(folder / "compare.csv", comparison)
+        save_overlays(traces(comparison.gaits, comparison.names), folder / "figures")
+
+
+@click.command("evaluate")
+@runs_argument()
+@click.option("--trial", metavar="NAME", help="Trial to compare joint angles with at equal time.")
+@out_option("Output folder; runs/evaluation-RUN if left out.", "-o")
+@json_option
+def evaluate_command(
+    runs: tuple[Path, ...], trial: str | None, out: Path | None, as_json: bool
+) -> None:
+    """Compare the gait of one or more run folders with the recordings of the patient.
+
+    A barefoot run and one with orthoses of the same patient also give the change from one to the
+    other. Recordings are those beside the patient's file. A run that did not converge is refused.
+    """
+    from pathwalker_cli.evaluation.evaluate import evaluate_gait
+    from pathwalker_cli.evaluation.run import gaits_of_runs
+    from pathwalker_cli.evaluation.tables import evaluation_content
+
+    gaits = [gait for _, gait in gaits_of_runs(runs)]
+    trials = _trials(gaits, trial)
+    evaluations = [evaluate_gait(gait, name) for gait, name in zip(gaits, trials, strict=True)]
+    changes = _changes(evaluations)
+    content = evaluation_content(evaluations, changes)
+    out = out or Path("runs") / "-".join(["evaluation", *(gait.name for gait in gaits)])
+    _write_evaluation(out, evaluations, content)
+    if as_json:
+        print_json(content)
+    else:
+        _report(evaluations, changes, out)
+
+
+def _trials(gaits: Sequence[Stride], trial: str | None) -> list[str | None]:
+    """Return the trial for each gait: the wanted one where its condition has it.
+
+    Raises:
+        DataError: If no condition has it.
+    """
+    from pathwalker_cli.errors import DataError
+    from pathwalker_cli.io.recordings import recording_names
+
+    if trial is None:
+        return [None] * len(gaits)
+    names = [recording_names(gait.walker.patient, gait.walker.condition) for gait in gaits]
+    if not any(trial in own for own in names):
+        allowed = ", ".join(dict.fromkeys(name for own in names for name in own))
+        raise DataError(
+            f"there is no recording '{trial}'",
+            where="--trial",
+            allowed=allowed or "none are there",
+            mend="leave it out",
+        )
+    return [trial if trial in own else None for own in names]
+
+
+def _changes(evaluations: Sequence[Evaluation]) -> tuple[Change, ...]:
+    """Return the changes between a barefoot run and one with orthoses of the same patient."""
+    from pathwalker_cli.evaluation.evaluate import gait_changes
+
+    pair = sorted(evaluations, key=lambda each: each.gait.walker.condition)
+    walkers = [each.gait.walker for each in pair]
+    if [walker.condition for walker in walkers] != ["barefoot", "orthosis"]:
+        return ()
+    return gait_changes(*pair) if walkers[0].patient.id == walkers[1].patient.id else ()
+
+
+def _write_evaluation(
+    out: Path, evaluations: Sequence[Evaluation], content: dict[str, Any]
+) -> None:
+    """Write tables and figures, all or none."""
+    from pathwalker_cli.evaluation.curves import Trace
+    from pathwalker_cli.evaluation.figures import save_evaluation_figures
+    from pathwalker_cli.evaluation.tables import write_csv
+    from pathwalker_cli.inverse.recorded_files import staged_folder
+    from pathwalker_cli.io.json_file import write_json
+
+    with staged_folder(out) as folder:
+        write_json(folder / "evaluation.json", content)
+        write_csv(folder / "evaluation.csv", evaluations)
+        for each in evaluations:
+            figures = folder / "figures"
+            save_evaluation_figures(
+                Trace(each.gait, each.gait.problem, each.recorded),
+                figures / each.gait.name if len(evaluations) > 1 else figures,
+            )
+
+
+def _report(evaluations: Sequence[Evaluation], changes: Sequence[Change], out: Path) -> None:
+    """Print the tables and what to know about them."""
+    from textwrap import fill
+
+    from pathwalker_cli.evaluation.tables import change_lines, evaluation_lines, evaluation_notes
+
+    for each in evaluations:
+        click.echo("\n".join(evaluation_lines(each)) + "\n")
+    if changes:
+        click.echo("\n".join(change_lines(changes)) + "\n")
+    notes = list(evaluation_notes(evaluations))
+    if len(evaluations) > 1 and not changes:
+        notes.append(
+            "a change is shown from one barefoot run to one run with orthoses of the same patient"
+        )
+    for note in notes:
+        click.echo(fill(f"note: {note}", 80, subsequent_indent="      "))
+    click.echo(f"\nWritten to {out}")

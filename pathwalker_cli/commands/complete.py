@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import click
 from click.shell_completion import CompletionItem
@@ -16,8 +16,6 @@ __all__ = [
     "complete_patients",
     "complete_problems",
     "complete_runs",
-    "runs_argument",
-    "set_option",
 ]
 
 _DEEPEST: Final = 3
@@ -74,13 +72,13 @@ def complete_runs(
     For `report`, all folders count that a page can be made of.
     """
     wanted = _is_reported if context.info_name == "report" else _is_run
-    found = []
+    offered = []
     for path in _paths(begun, ()):
         if wanted(Path(path)):
-            found.append(path.removesuffix("/"))
+            offered.append(path.removesuffix("/"))
         elif _holds(Path(path), wanted):
-            found.append(path)
-    return _items(found)
+            offered.append(path)
+    return _items(offered)
 
 
 def complete_keys(
@@ -90,30 +88,6 @@ def complete_keys(
     name = _SHIPPED.get(context.info_name or "")
     keys = _keys_of_shipped(name) if name else _keys_of_predictions()
     return _items(key for key in keys if key.startswith(begun))
-
-
-def set_option(meaning: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return what adds the option --set to a command, as `changes`."""
-    return click.option(
-        "--set",
-        "changes",
-        multiple=True,
-        metavar="KEY=VALUE",
-        help=meaning,
-        shell_complete=complete_keys,
-    )
-
-
-def runs_argument(metavar: str = "RUN...") -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return what adds the argument `runs`, one run folder or more, to a command."""
-    return click.argument(
-        "runs",
-        nargs=-1,
-        required=True,
-        metavar=metavar,
-        type=click.Path(path_type=Path),
-        shell_complete=complete_runs,
-    )
 
 
 def _is_run(folder: Path) -> bool:
@@ -156,7 +130,7 @@ def _folders(folder: Path) -> list[Path]:
 def _keys_of_predictions() -> Iterator[str]:
     """Yield the keys of the config of a prediction, from its model."""
     from pathwalker_cli.config import StudyConfig
-    from pathwalker_cli.io.described import is_model
+    from pathwalker_cli.io.fields import is_model
 
     for name, field in StudyConfig.model_fields.items():
         block = field.annotation
@@ -199,3 +173,21 @@ def _paths(begun: str, endings: tuple[str, ...]) -> Iterator[str]:
             yield f"{folder}{slash}{path.name}/"
         elif path.suffix in endings:
             yield f"{folder}{slash}{path.name}"
+
+
+@click.command("completion")
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+@click.pass_context
+def completion_command(context: click.Context, shell: str) -> None:
+    """Print the script that completes commands, options, configs, problems and runs in SHELL.
+
+    Bash needs version 4.4 or later. Load it at every start of the shell, as the examples say.
+    """
+    from click.shell_completion import ShellComplete, get_completion_class
+
+    kind = get_completion_class(shell)
+    assert kind is not None  # noqa: S101 - click knows every shell of the choice
+    program = context.find_root().command
+    complete = kind(program, {}, "pathwalker", "_PATHWALKER_COMPLETE")
+    # Bash's own `source` asks a bash for its version; the script is the same without one.
+    click.echo(ShellComplete.source(complete), nl=False)

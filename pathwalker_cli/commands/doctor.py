@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.options import json_option, print_json
 
 __all__ = ["Finding", "doctor_command", "findings"]
 
@@ -35,13 +35,13 @@ class Finding:
 @click.pass_context
 def doctor_command(context: click.Context, as_json: bool) -> None:
     """Check versions, dynamics back ends, solver and shipped data; exit code 0 if all is usable."""
-    found = findings()
-    usable = all(finding.ok for finding in found if finding.needed)
+    all_findings = findings()
+    usable = all(finding.ok for finding in all_findings if finding.needed)
     if as_json:
-        content = {"usable": usable, "findings": [asdict(finding) for finding in found]}
+        content = {"usable": usable, "findings": [asdict(finding) for finding in all_findings]}
         print_json(content)
     else:
-        for finding in found:
+        for finding in all_findings:
             mark = "ok" if finding.ok else ("MISSING" if finding.needed else "-")
             click.echo(f"{mark:<8}{finding.name:<28}{finding.detail}")
         click.echo("PathWalker is ready." if usable else "PathWalker cannot solve problems here.")

@@ -33,18 +33,17 @@ def init_command(
     was recorded of another child, played by the model of the made-up one. DIR must be new or empty.
     """
     from pathwalker_cli.starter.child import made_child
-    from pathwalker_cli.starter.files import command_lines, next_steps
-    from pathwalker_cli.starter.folder import write_folder
+    from pathwalker_cli.starter.files import command_lines, next_steps, write_folder
 
     child = made_child(name or _safe(folder.resolve().name), age, mass, height)
-    worn = not without_orthosis
-    write_folder(folder, child, worn, example)
+    with_orthosis = not without_orthosis
+    write_folder(folder, child, with_orthosis, example)
     click.echo(
         f"Wrote {folder}: a made-up child of {child.age:g} years, {child.body_mass:g} kg and "
         f"{child.height:g} m.\n\nNext:\n"
     )
     click.echo(f"{command_lines(f'cd {_quoted(folder)}', 2)}")
-    for number, step in enumerate(next_steps(worn, example), start=1):
+    for number, step in enumerate(next_steps(with_orthosis, example), start=1):
         click.echo(f"\n{click.wrap_text(f'{number}. {step.why}', 80, '# ', '# ')}")
         for command in step.commands:
             click.echo(command_lines(command, 2))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from pathwalker_cli.commands.complete import complete_patients
+from pathwalker_cli.commands.options import out_option
 
 if TYPE_CHECKING:
     from pathwalker_cli.conventions import Condition
@@ -25,9 +26,7 @@ __all__ = ["model_command"]
     type=click.Choice(["barefoot", "orthosis"]),
     help="What is worn: nothing, or shoes and orthoses.",
 )
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path), metavar="FILE", help="File; else stdout."
-)
+@out_option("File; else stdout.", "-o", metavar="FILE")
 @click.option(
     "--published", is_flag=True, help="Keep the published model's misplaced right forearm and hand."
 )
@@ -41,13 +40,13 @@ def model_command(patient: str, condition: str, out: Path | None, published: boo
     from pathwalker_cli.model.urdf import urdf_text
     from pathwalker_cli.patient import load_patient
 
-    who, worn = load_patient(patient), cast("Condition", condition)
-    text = urdf_text(who, worn, published)
+    who, chosen = load_patient(patient), cast("Condition", condition)
+    text = urdf_text(who, chosen, published)
     if out is None:
         click.echo(text, nl=False)
     else:
         write_text(out, text)
-    for line in _summary(who, worn, segments(who, worn, published)):
+    for line in _summary(who, chosen, segments(who, chosen, published)):
         click.echo(line, err=True)
 
 

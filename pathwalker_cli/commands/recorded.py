@@ -9,9 +9,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from pathwalker_cli.commands.complete import complete_configs, complete_patients, set_option
-from pathwalker_cli.commands.json_output import json_option, print_json
-from pathwalker_cli.commands.kinds import meant_as
+from pathwalker_cli.commands.complete import complete_configs, complete_patients
+from pathwalker_cli.commands.options import (
+    json_option,
+    meant_as,
+    out_option,
+    print_json,
+    set_option,
+)
 from pathwalker_cli.conventions import CONDITIONS, Condition
 
 if TYPE_CHECKING:
@@ -26,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["id_command", "ik_command", "import_command"]
 
-_OUT = click.option("--out", type=click.Path(path_type=Path), help="Output folder.")
+_OUT = out_option("Output folder.", metavar=None)
 _QUIET = click.option("--quiet", is_flag=True, help="Print warnings only.")
 _SET = set_option("Override a config value.")
 
@@ -40,7 +45,7 @@ _SET = set_option("Override a config value.")
     shell_complete=complete_patients,
 )
 @click.option("--condition", required=True, type=click.Choice(CONDITIONS), help="What was worn.")
-@click.option("-o", "--out", required=True, type=click.Path(path_type=Path), help="Output folder.")
+@out_option("Output folder.", "-o", required=True, metavar=None)
 @click.option("--markers", help="Marker set; the shipped markers.yaml if left out.")
 @_QUIET
 def import_command(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from pathwalker_cli.commands.options import out_option, quiet_option
+
 if TYPE_CHECKING:
     from pathwalker_cli.case import Case
 
@@ -14,13 +16,8 @@ __all__ = ["reproduce_command"]
 
 
 @click.command("reproduce")
-@click.option(
-    "-o",
-    "--out",
-    type=click.Path(path_type=Path),
-    required=True,
-    metavar="DIR",
-    help="Folder of page, figures and runs; what is done there already is kept.",
+@out_option(
+    "Folder of page, figures and runs; what is done there already is kept.", "-o", required=True
 )
 @click.option("--quick", is_flag=True, help="Coarse meshes and single starts, for a quick check.")
 @click.option(
@@ -37,7 +34,7 @@ __all__ = ["reproduce_command"]
     metavar="DIR",
     help="The article's C3D files in DIR/barefoot and DIR/orthosis, for its own inverse dynamics.",
 )
-@click.option("--quiet", is_flag=True, help="Print errors only.")
+@quiet_option
 def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, quiet: bool) -> None:
     """Reproduce the article from the shipped data and write DIR/results.md.
 
@@ -47,8 +44,7 @@ def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, qui
     all converged, 1 some problem did not, 2 bad input.
     """
     from pathwalker_cli.errors import NotConvergedError
-    from pathwalker_cli.reproduce.pipeline import PAGE, reproduce
-    from pathwalker_cli.reproduce.plan import ENTRIES
+    from pathwalker_cli.reproduce.pipeline import ENTRIES, PAGE, reproduce
     from pathwalker_cli.studies.base import claimed_folder
 
     def say(line: str) -> None:

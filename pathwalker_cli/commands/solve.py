@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from pathwalker_cli.commands.complete import (
-    complete_configs,
-    complete_problems,
-    complete_runs,
+from pathwalker_cli.commands.complete import complete_configs, complete_problems, complete_runs
+from pathwalker_cli.commands.options import (
+    json_option,
+    meant_as,
+    out_option,
+    print_json,
+    quiet_option,
     set_option,
 )
-from pathwalker_cli.commands.json_output import json_option, print_json
-from pathwalker_cli.commands.kinds import meant_as
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -30,12 +31,9 @@ __all__ = ["solve_command"]
 @click.command("solve")
 @click.argument("problem", metavar="PROBLEM", shell_complete=complete_problems)
 @click.argument("config", metavar="CONFIG", shell_complete=complete_configs)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Run folder; runs/PROBLEM-PATIENT if left out, with -smoke behind it after --smoke. An "
-    "earlier run in it is replaced.",
+@out_option(
+    "Run folder; runs/PROBLEM-PATIENT if left out, with -smoke behind it after --smoke. An "
+    "earlier run in it is replaced."
 )
 @click.option(
     "--warm-start",
@@ -46,7 +44,7 @@ __all__ = ["solve_command"]
 )
 @click.option("--smoke", is_flag=True, help="Coarse mesh without refinement, for a quick check.")
 @set_option("Override a config value.")
-@click.option("--quiet", is_flag=True, help="Print errors only.")
+@quiet_option
 @json_option
 def solve_command(
     problem: str,

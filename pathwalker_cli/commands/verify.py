@@ -8,8 +8,14 @@ from pathlib import Path
 
 import click
 
-from pathwalker_cli.commands.complete import complete_runs, runs_argument
-from pathwalker_cli.commands.json_output import json_option, print_json
+from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.options import (
+    json_option,
+    out_option,
+    print_json,
+    quiet_option,
+    runs_argument,
+)
 
 __all__ = ["rerun_command", "verify_command"]
 
@@ -32,7 +38,7 @@ def verify_command(context: click.Context, runs: tuple[Path, ...], as_json: bool
     from pathwalker_cli.verification.folders import runs_in, verify_table
     from pathwalker_cli.verification.text import verification_lines
 
-    found: list[Verification] = []
+    verifications: list[Verification] = []
     refused: list[PathwalkerError] = []
     steps: list[Callable[[], Verification | None]]
     steps = [partial(verify_table, folder) for folder in runs]
@@ -45,13 +51,13 @@ def verify_command(context: click.Context, runs: tuple[Path, ...], as_json: bool
             click.echo(f"Error: {error}", err=True)
             continue
         if verification is not None:
-            found.append(verification)
+            verifications.append(verification)
             if not as_json:
                 click.echo("\n".join(verification_lines(verification)) + "\n")
     if as_json:
-        verified = [each.as_dict() for each in found]
+        verified = [each.as_dict() for each in verifications]
         print_json({"runs": verified, "refused": [str(error) for error in refused]})
-    failed = [str(each.folder) for each in found if not each.passed]
+    failed = [str(each.folder) for each in verifications if not each.passed]
     if failed:
         click.echo(f"Error: {', '.join(failed)}: a check failed", err=True)
     damaged = any(not isinstance(error, NotConvergedError) for error in refused)
@@ -60,13 +66,8 @@ def verify_command(context: click.Context, runs: tuple[Path, ...], as_json: bool
 
 @click.command("rerun")
 @click.argument("run", metavar="RUN", type=click.Path(path_type=Path), shell_complete=complete_runs)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="Run folder; RUN-again if left out. An earlier run in it is replaced.",
-)
-@click.option("--quiet", is_flag=True, help="Print errors only.")
+@out_option("Run folder; RUN-again if left out. An earlier run in it is replaced.")
+@quiet_option
 def rerun_command(run: Path, out: Path | None, quiet: bool) -> None:
     """Solve RUN again from its folder alone, and tell how the two differ.
 
@@ -79,7 +80,7 @@ def rerun_command(run: Path, out: Path | None, quiet: bool) -> None:
     from pathwalker_cli.results.run_folder import claimed_run, load_run
     from pathwalker_cli.results.text import failure_text
     from pathwalker_cli.studies.run import run_study
-    from pathwalker_cli.verification.again import difference_lines
+    from pathwalker_cli.verification.text import difference_lines
 
     before = load_run(run, allow_unconverged=True)
     folder = out or run.with_name(f"{run.resolve().name}-again")

@@ -10,7 +10,7 @@ from typing import Any, Final
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, Row
 from pathwalker_cli.evaluation.paper import PATIENT, PaperClaim, PaperNumber
 from pathwalker_cli.evaluation.recorded import Spread
-from pathwalker_cli.io.table import write_table
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.stride.measure import Measure
 
 __all__ = [

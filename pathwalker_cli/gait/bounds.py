@@ -12,7 +12,7 @@ from pathwalker_cli.config import BoundsConfig, StudyConfig
 from pathwalker_cli.conventions import ANGLES, GRAVITY, ROOT
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.problem import ACTIVATIONS, RESERVES, VELOCITIES
-from pathwalker_cli.io.described import quantity_at
+from pathwalker_cli.io.fields import quantity_at
 from pathwalker_cli.model.contact import FORCES, PHASES, POINTS
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.model.walker import Walker

@@ -19,7 +19,7 @@ from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, StageRecord
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.io.processes import called_elsewhere
+from pathwalker_cli.io.processes import results_of_calls
 from pathwalker_cli.nlp.ipopt import NlpResult
 
 __all__ = ["solve_from_starts", "spread_starts"]
@@ -100,7 +100,7 @@ def solve_from_starts(case: Case, finished: Finished | None = None) -> GaitSolut
 def _outcomes(cases: list[Case], finished: Finished | None) -> Iterator[_Outcome]:
     """Yield the outcomes of all starts as they come."""
     workers = min(len(cases), len(os.sched_getaffinity(0)))
-    for outcome in called_elsewhere(_solved, list(enumerate(cases)), workers):
+    for outcome in results_of_calls(_solved, list(enumerate(cases)), workers):
         if finished is not None:
             finished(outcome.optimum)
         yield outcome

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,11 +13,10 @@ from pathwalker_cli.inverse.recorded import recorded
 from pathwalker_cli.inverse.recorded_files import strength_lines
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.io.recordings import CompactRecording
-from pathwalker_cli.io.yaml_blocks import with_block
 from pathwalker_cli.patient import Patient, shipped_patients
 from pathwalker_cli.patient.blocks import Recorded, Strengths
 
-__all__ = ["recorded_blocks", "require_own_patient", "update_patient"]
+__all__ = ["recorded_blocks", "require_own_patient", "update_patient", "with_block"]
 
 
 def require_own_patient(patient: Patient) -> Path:
@@ -95,3 +95,26 @@ def _recorded_lines(blocks: Mapping[Condition, tuple[Recorded, int]]) -> list[st
               for name, (low, high) in found.joint_ranges.items()),
         ]  # fmt: skip
     return lines
+
+
+def with_block(text: str, key: str, lines: Sequence[str]) -> str:
+    """Return the text of a YAML file with a block in place of the one under a key.
+
+    Comments above the key stay; those within the block go.  A block that is not there yet is
+    added at the end.
+
+    Args:
+        text: The text of the file.
+        key: The outermost key.
+        lines: The block, the key's line among them.
+    """
+    found = text.splitlines()
+    begin = next((i for i, line in enumerate(found) if re.match(rf"{key}\s*:", line)), None)
+    if begin is None:
+        return "\n".join([*found, "", *lines]) + "\n"
+    end = begin + 1
+    while end < len(found) and (not found[end].strip() or found[end][0] in " \t"):
+        end += 1
+    while not found[end - 1].strip():
+        end -= 1
+    return "\n".join([*found[:begin], *lines, *found[end:]]) + "\n"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import shutil
 import tempfile
@@ -16,6 +15,7 @@ import numpy as np
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.inverse.study_tables import ResidualTable, StrengthTable
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.opensim import force_table, torque_table, write_opensim
 from pathwalker_cli.io.recordings import CompactRecording, write_recording
 from pathwalker_cli.io.trajectory_csv import write_trajectory
@@ -85,7 +85,7 @@ def write_trial(folder: Path, trial: StudyTrial) -> None:
         write_opensim(f"{stem}_torques.sto", torque_table(trial.tau))
     if trial.markers is not None:
         rows = [row[2:] for row in _marker_rows([trial])]
-        _write(Path(f"{stem}_residuals.csv"), list(_MARKER_HEADER[2:]), rows)
+        write_table(f"{stem}_residuals.csv", list(_MARKER_HEADER[2:]), rows)
 
 
 _MARKER_HEADER: Final = (
@@ -114,7 +114,7 @@ def _marker_rows(trials: Iterable[StudyTrial]) -> list[list[object]]:
 
 def write_marker_table(path: Path, trials: Iterable[StudyTrial]) -> None:
     """Write the distance of every marker point in every trial."""
-    _write(path, list(_MARKER_HEADER), _marker_rows(trials))
+    write_table(path, list(_MARKER_HEADER), _marker_rows(trials))
 
 
 def write_stances(path: Path, trials: Iterable[StudyTrial]) -> None:
@@ -128,7 +128,7 @@ def write_stances(path: Path, trials: Iterable[StudyTrial]) -> None:
     ]  # fmt: skip
     header = ["condition", "trial", "side", "strike [frame]", "toe-off [frame]", "plate",
               "measured", "reason"]  # fmt: skip
-    _write(path, header, rows)
+    write_table(path, header, rows)
 
 
 def write_residuals(path: Path, tables: Sequence[ResidualTable]) -> None:
@@ -150,7 +150,7 @@ def write_residuals(path: Path, tables: Sequence[ResidualTable]) -> None:
                 per_mass = mean / table.body_mass
                 shown = [f"{x:.5g}" for x in mean], [f"{x:.5g}" for x in per_mass]
                 rows.append([*start, f"{name} over trials", "", *shown[0], "", "", "", *shown[1]])
-    _write(path, header, rows)
+    write_table(path, header, rows)
 
 
 def write_strengths(path: Path, table: StrengthTable) -> None:
@@ -170,7 +170,7 @@ def write_strengths(path: Path, table: StrengthTable) -> None:
         rows.append(
             [row.generator, f"{row.value:.5g}", given, deviation, *peak, *single, row.remark]
         )
-    _write(path, header, rows)
+    write_table(path, header, rows)
 
 
 def write_strengths_yaml(path: Path, strengths: Strengths, source: str) -> None:
@@ -196,11 +196,3 @@ def strength_lines(strengths: Strengths) -> list[str]:
             shown = f"{value:.4f}"
         lines.append(f"  {name}: {shown}")
     return lines
-
-
-def _write(path: Path, header: list[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any, Final, Literal
 
-from pathwalker_cli.errors import DataError
+from pathwalker_cli.errors import DataError, InputError
 
 __all__ = [
     "atomic_open",
@@ -20,6 +20,7 @@ __all__ = [
     "check_output",
     "check_room",
     "output_path",
+    "refuse_special",
     "swapped",
     "sweep",
     "write_text",
@@ -159,3 +160,17 @@ def write_text(path: Path, text: str) -> None:
     """
     with output_path(path) as file:
         file.write_text(text, encoding="utf-8", newline="")
+
+
+def refuse_special(path: Path, error: type[InputError] = DataError) -> None:
+    """Refuse a pipe or a device; whether there is anything at all, who reads will tell.
+
+    Raises:
+        InputError: Of class `error`.
+    """
+    try:
+        special = path.exists() and not path.is_file() and not path.is_dir()
+    except (OSError, ValueError):
+        return
+    if special:
+        raise error("is a pipe or a device", where=str(path), allowed="a file")

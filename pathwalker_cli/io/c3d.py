@@ -242,7 +242,7 @@ def _events(parameters: Any, rate: float, first_frame: int, frames: int) -> tupl
     if "TIMES" not in group or not np.size(group["TIMES"]["value"]):
         return ()
     minutes, seconds = group["TIMES"]["value"]
-    found = []
+    events = []
     for side, kind, time in zip(
         group["CONTEXTS"]["value"],
         group["LABELS"]["value"],
@@ -252,8 +252,8 @@ def _events(parameters: Any, rate: float, first_frame: int, frames: int) -> tupl
         key_side, key_kind = str(side).strip().lower(), str(kind).strip().lower()
         frame = math.ceil(round(float(time) * rate, 3)) - (first_frame - 1)
         if key_side in _SIDES and key_kind in _KINDS and 0 <= frame < frames:
-            found.append(Event(_SIDES[key_side], _KINDS[key_kind], frame))
-    return tuple(sorted(found, key=lambda event: event.frame))
+            events.append(Event(_SIDES[key_side], _KINDS[key_kind], frame))
+    return tuple(sorted(events, key=lambda event: event.frame))
 
 
 def analog_offset_error(offset: np.ndarray, scale: np.ndarray, unsigned: bool) -> np.ndarray:

@@ -34,18 +34,18 @@ def c3d_files(paths: Sequence[str | Path]) -> tuple[Path, ...]:
     Raises:
         DataError: If a path does not exist, a folder holds none, or two files have one name.
     """
-    found: list[Path] = []
+    files: list[Path] = []
     for path in map(Path, paths):
         if os.path.isdir(path):  # False too for what cannot be a path
             inside = sorted(p for p in path.iterdir() if p.suffix.lower() == ".c3d")
             if not inside:
                 raise DataError("no C3D file in this folder", where=str(path), allowed="*.c3d")
-            found += inside
+            files += inside
         elif os.path.isfile(path):
-            found.append(path)
+            files.append(path)
         else:
             raise DataError("no such recording", where=str(path), mend="check the path")
-    unique = tuple({path.resolve(): path for path in found}.values())
+    unique = tuple({path.resolve(): path for path in files}.values())
     stems = [path.stem for path in unique]
     twice = next((path for path in unique if stems.count(path.stem) > 1), None)
     if twice:

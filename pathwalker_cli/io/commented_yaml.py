@@ -35,7 +35,7 @@ def reasons(path: Path) -> dict[str, str]:
     A comment goes on in the lines below it that hold only a comment, further in than the key.
     Comments above a key within a block are its own if nothing stands beside it.
     """
-    found: dict[str, str] = {}
+    comments: dict[str, str] = {}
     parents: list[tuple[int, str]] = []
     key, commented, above = "", False, ""
     for line in path.read_text(encoding="utf-8").splitlines():
@@ -47,16 +47,16 @@ def reasons(path: Path) -> dict[str, str]:
             key = ".".join([*(name for _, name in parents), entry["key"]])
             parents.append((indent, entry["key"]))
             commented = mark is not None
-            found[key] = mark["text"].strip() if mark else above.strip()
+            comments[key] = mark["text"].strip() if mark else above.strip()
             above = ""
         elif mark and commented and line.index("#") > parents[-1][0]:
             text = mark["text"].strip()
-            found[key] += f"; {text}" if re.match(r"\w+: ", text) else f" {text}"
+            comments[key] += f"; {text}" if re.match(r"\w+: ", text) else f" {text}"
         else:
             commented = False
             inside = mark is not None and line.index("#") > 0
             above = f"{above} {mark['text'].strip()}" if mark and inside else ""
-    return found
+    return comments
 
 
 def entries(path: Path) -> tuple[Entry, ...]:

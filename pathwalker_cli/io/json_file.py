@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.io.atomic import atomic_open
-from pathwalker_cli.io.special import refuse_special
+from pathwalker_cli.io.atomic import atomic_open, refuse_special
 
 __all__ = ["json_text", "read_json", "write_json"]
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import errno
-import fcntl
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Final
+from typing import Final
+
+from filelock import FileLock, Timeout
 
 from pathwalker_cli.errors import DataError
 
@@ -34,42 +34,23 @@ def locked(file: Path, where: Path, wait: bool = False) -> Iterator[None]:
     """
     mend = "choose another --out"
     missing = [folder for folder in file.parents if not folder.exists()]
+    # a soft lock would outlive a holder that is killed
+    lock = FileLock(file, timeout=-1 if wait else 0, fallback_to_soft=False)
     try:
-        held = _held(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise DataError(
-            "another `pathwalker` is at work there",
-            where=str(where),
-            mend=f"wait until it is done, or {mend}",
-        ) from None
-    except OSError as problem:
-        what = f"cannot be written: {problem.strerror}"
-        raise DataError(what, where=str(where), mend=mend) from None
-    with held:
-        try:
-            yield
-        finally:
-            with suppress(OSError):
-                file.unlink()
-                for folder in missing:
-                    folder.rmdir()  # as far as they are empty
-
-
-def _held(file: Path, way: int) -> IO[bytes]:
-    """Return a file open and locked that still has its name then: its last holder removes it."""
-    while True:
         file.parent.mkdir(parents=True, exist_ok=True)
-        opened = file.open("ab")
-        try:
-            try:
-                fcntl.flock(opened, way)
-            except OSError as problem:
-                if problem.errno not in _NO_LOCKS:
-                    raise
-            with suppress(FileNotFoundError):
-                if os.path.samestat(os.fstat(opened.fileno()), file.stat()):
-                    return opened
-        except BaseException:
-            opened.close()
-            raise
-        opened.close()
+        lock.acquire()
+    except Timeout:
+        what = "another `pathwalker` is at work there"
+        raise DataError(what, where=str(where), mend=f"wait until it is done, or {mend}") from None
+    except OSError as problem:
+        if problem.errno not in _NO_LOCKS:
+            what = f"cannot be written: {problem.strerror}"
+            raise DataError(what, where=str(where), mend=mend) from None
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            file.unlink()  # while it is held: whoever waits for it then makes it anew
+            for folder in missing:
+                folder.rmdir()  # as far as they are empty
+        lock.release()

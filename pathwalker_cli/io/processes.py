@@ -1,4 +1,4 @@
-"""Worker processes of every kind of pool: they end with their parent, who alone hears Ctrl-C."""
+"""Worker processes: they end with their parent, who alone hears Ctrl-C."""
 
 from __future__ import annotations
 
@@ -6,28 +6,35 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from multiprocessing.process import BaseProcess
+from contextlib import closing, contextmanager, suppress
+from multiprocessing.resource_tracker import ensure_running
 from typing import Any, Final, TypeVar
+
+from pebble import ProcessExpired, ProcessPool
 
 from pathwalker_cli.errors import NotConvergedError
 
-__all__ = ["called_elsewhere", "deaf", "prepare_worker"]
+__all__ = ["ended_calls", "prepare_worker", "results_of_calls"]
 
 LOST: Final = (
     "a process was ended from outside (out of memory?); call again, with fewer processes if need be"
 )
 """What to know if a worker dies."""
 
+GLANCE: Final = 1.0
+"""Time after which it is noticed that no worker can begin at all [s]."""
+
 Result = TypeVar("Result")
 
 
 @contextmanager
-def deaf() -> Iterator[None]:
-    """Put Ctrl-C off; processes that are begun meanwhile are deaf until they say otherwise."""
+def _blocked_sigint() -> Iterator[None]:
+    """Put Ctrl-C off; processes and threads that are begun meanwhile never hear it."""
+    ensure_running()  # multiprocessing's own process, whose begin would let Ctrl-C in again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -36,57 +43,73 @@ def deaf() -> Iterator[None]:
 
 
 def prepare_worker() -> None:
-    """Make a worker deaf to Ctrl-C, which is for the parent, and end it with its parent.
+    """End a worker with its parent, and at once when it is asked to.
 
     A killed parent cannot tell its workers: they would wait for work forever.
     """
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_wait_and_end, args=(parent,), daemon=True).start()
+    assert parent is not None  # noqa: S101 - workers have one
+
+    def wait_and_end() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait_and_end, daemon=True).start()
 
 
-def _wait_and_end(parent: BaseProcess) -> None:
-    parent.join()
-    os._exit(1)
-
-
-def called_elsewhere(
+def ended_calls(
     call: Callable[..., Result],
     calls: Sequence[tuple[Any, ...]],
     workers: int,
-    begin: Callable[..., None] = prepare_worker,
-    arguments: tuple[Any, ...] = (),
-) -> Iterator[Result]:
-    """Yield the results of calls in worker processes as they come.
+    time_limit: float | None = None,
+) -> Generator[tuple[int, Future[Result]]]:
+    """Yield number and future of every call as it ends in a worker process.
 
-    If the caller stops, e.g. by Ctrl-C, all workers are ended at once.
+    A worker that dies takes along the one call in its hands, whose future raises `ProcessExpired`;
+    if no worker can begin, all futures raise `BrokenProcessPool`.  If the caller stops, e.g. by
+    Ctrl-C, all workers are ended at once.
 
     Args:
         call: What is called.
         calls: Its arguments, a tuple for every call.
         workers: Most processes.
-        begin: Called first in every process; begins with `prepare_worker`.
-        arguments: Arguments of `begin`.
+        time_limit: Longest time of a call [s], after which its future raises `TimeoutError`.
+    """
+    waiting, running = deque(enumerate(calls)), dict[Future[Result], int]()
+    count, context = min(workers, len(calls)), multiprocessing.get_context("spawn")
+    pool = ProcessPool(count, initializer=prepare_worker, context=context)
+    try:
+        while waiting or running:
+            with _blocked_sigint():  # asking whether a new pool is active makes it begin
+                if not pool.active:
+                    break
+                with suppress(RuntimeError):  # it broke since it was asked
+                    while waiting and len(running) < count:
+                        scheduled = pool.schedule(call, waiting[0][1], timeout=time_limit)
+                        running[scheduled] = waiting.popleft()[0]
+            for future in wait(running, GLANCE, FIRST_COMPLETED).done:
+                yield running.pop(future), future
+    finally:
+        with _blocked_sigint():  # within the pool it could leave a lock held, and it never end
+            pool.stop()
+            pool.join()
+    broken: Future[Result] = Future()
+    broken.set_exception(BrokenProcessPool())
+    yield from ((number, broken) for number in (*running.values(), *(n for n, _ in waiting)))
+
+
+def results_of_calls(
+    call: Callable[..., Result], calls: Sequence[tuple[Any, ...]], workers: int
+) -> Iterator[Result]:
+    """Yield the results of calls in worker processes as they come; see `ended_calls`.
 
     Raises:
         NotConvergedError: If a worker died.
     """
-    others = multiprocessing.active_children()
-    context = multiprocessing.get_context("spawn")
-    count = min(workers, len(calls))
-    pool = ProcessPoolExecutor(count, context, initializer=begin, initargs=arguments)
     try:
-        with deaf():
-            futures = [pool.submit(call, *each) for each in calls]
-        for future in as_completed(futures):
-            yield future.result()
-    except BrokenProcessPool:
+        with closing(ended_calls(call, calls, workers)) as ended:
+            for _, future in ended:
+                yield future.result()
+    except (ProcessExpired, BrokenProcessPool):
         raise NotConvergedError(LOST) from None
-    except BaseException:
-        for worker in multiprocessing.active_children():
-            if worker not in others:
-                worker.kill()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Final
 from pathwalker_cli.conventions import COORDINATES, SUFFIX, Condition, Side, coordinate_unit
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.c3d import LEAST_FRAMES, Event
+from pathwalker_cli.io.csv_file import read_cells, write_table
 from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.trajectory import Trajectory
@@ -64,12 +64,9 @@ def write_recording(folder: str | Path, recording: CompactRecording) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     stem = folder / recording.name
     write_trajectory(f"{stem}_angles.csv", recording.motion)
-    with Path(f"{stem}_events.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(_EVENT_COLUMNS)
-        for event in recording.events:
-            time = recording.motion.time[event.frame]
-            writer.writerow([event.side, event.kind, event.frame, f"{time:.6g}"])
+    time = recording.motion.time
+    events = ([e.side, e.kind, e.frame, f"{time[e.frame]:.6g}"] for e in recording.events)
+    write_table(f"{stem}_events.csv", _EVENT_COLUMNS, events)
     if recording.forces is not None:
         write_trajectory(f"{stem}_forces.csv", recording.forces)
 
@@ -147,14 +144,7 @@ def _folders(patient: Patient, condition: Condition) -> list[Path]:
 
 def _read_events(path: Path, frames: int) -> tuple[Event, ...]:
     """Return the events in a file."""
-    mend = "import the recording again"
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.reader(file))
-    except FileNotFoundError:
-        raise DataError("no such file", where=str(path), mend=mend) from None
-    except (OSError, UnicodeDecodeError, csv.Error) as problem:
-        raise DataError(f"cannot be read: {problem}", where=str(path), mend=mend) from None
+    rows = read_cells(path, "import the recording again")
     if not rows or rows[0] != _EVENT_COLUMNS:
         raise DataError(
             "has another header", where=f"{path}, row 1", allowed=",".join(_EVENT_COLUMNS)

@@ -106,15 +106,15 @@ def _alternatives(
     Several problems of one value are those of the kinds that it might be of, e.g. a word or a
     number: all that is allowed is told.
     """
-    found = [_clauses(problem, path, model_class) for problem in problems]
-    if len(found) == 1:
-        return found[0]
+    clauses = [_clauses(problem, path, model_class) for problem in problems]
+    if len(clauses) == 1:
+        return clauses[0]
     value = problems[0]["input"]
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    units = [c for p, c in zip(problems, found, strict=True) if p["type"] == "pathwalker"]
+    units = [c for p, c in zip(problems, clauses, strict=True) if p["type"] == "pathwalker"]
     what, _, mend = units[0] if number and units else (f"is {_shown(value)}", "", "")
     # A unit alone does not say that a number is meant where words are allowed too.
-    allowed = [f"a number, {text}" if c in units else text for c in found if (text := c[1])]
+    allowed = [f"a number, {text}" if c in units else text for c in clauses if (text := c[1])]
     return what, " or ".join(dict.fromkeys(allowed)), mend
 
 
@@ -169,7 +169,7 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
-        found = _model_in(argument)
-        if found is not None:
-            return found
+        model = _model_in(argument)
+        if model is not None:
+            return model
     return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.csv_file import read_cells, write_table
 from pathwalker_cli.trajectory import Trajectory
 
 __all__ = ["read_trajectory", "write_trajectory"]
@@ -27,11 +27,9 @@ def write_trajectory(path: str | Path, trajectory: Trajectory, digits: int = 6) 
         digits: Significant digits.
     """
     names = zip(trajectory.names, trajectory.units, strict=True)
-    with Path(path).open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["time [s]", *(f"{name} [{unit}]" for name, unit in names)])
-        for time, row in zip(trajectory.time, trajectory.values, strict=True):
-            writer.writerow([_text(value, digits) for value in (time, *row)])
+    header = ["time [s]", *(f"{name} [{unit}]" for name, unit in names)]
+    rows = np.column_stack([trajectory.time, trajectory.values])
+    write_table(path, header, ([_text(value, digits) for value in row] for row in rows))
 
 
 def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
@@ -44,7 +42,9 @@ def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
     Raises:
         DataError: If the file cannot be read; the message names row and column.
     """
-    rows = _rows(Path(path))
+    rows = read_cells(Path(path), "check the path")
+    if not rows:
+        raise DataError("is empty", where=str(path))
     names, units = _header(rows[0], path)
     values = np.empty((len(rows) - 1, len(names)))
     for index, row in enumerate(rows[1:]):
@@ -63,20 +63,6 @@ def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
     if late.size:
         raise DataError("time does not increase", where=f"{path}, row {late[0] + 3}, column time")
     return Trajectory(time, tuple(names[1:]), values[:, 1:], tuple(units[1:]))
-
-
-def _rows(path: Path) -> list[list[str]]:
-    """Return the rows of a CSV file without empty ones."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except FileNotFoundError:
-        raise DataError("no such file", where=str(path), mend="check the path") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as problem:
-        raise DataError(f"cannot be read: {problem}", where=str(path)) from None
-    if not rows:
-        raise DataError("is empty", where=str(path))
-    return rows
 
 
 def _header(row: list[str], path: str | Path) -> tuple[list[str], list[str]]:

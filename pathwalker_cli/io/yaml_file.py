@@ -13,8 +13,8 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from pathwalker_cli.errors import ConfigError, InputError
+from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.io.refusals import KeyPath, Lines, dotted, place, sentence
-from pathwalker_cli.io.special import refuse_special
 
 __all__ = [
     "KeyPath",
@@ -91,8 +91,8 @@ def mapping_in(
     """Return the mapping in the text of a YAML file; see `read_mapping`."""
     content, lines = _content(text, str(path), error)
     if not isinstance(content, dict):
-        found = "nothing" if content is None else f"a {type(content).__name__}"
-        raise error(f"holds {found}", where=str(path), allowed="keys with values ('key: value')")
+        kind = "nothing" if content is None else f"a {type(content).__name__}"
+        raise error(f"holds {kind}", where=str(path), allowed="keys with values ('key: value')")
     return content, lines
 
 
@@ -246,9 +246,9 @@ def _not_finite(value: Any, prefix: KeyPath = ()) -> KeyPath:
     elif isinstance(value, float) and not math.isfinite(value):
         return prefix
     for key, item in items:
-        found = _not_finite(item, (*prefix, key))
-        if found:
-            return found
+        path = _not_finite(item, (*prefix, key))
+        if path:
+            return path
     return ()
 
 

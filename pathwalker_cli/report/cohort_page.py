@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Final
 
 from pathwalker_cli.conventions import SIDES, to_degrees
+from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
-from pathwalker_cli.report.csv_table import number, read_rows
 from pathwalker_cli.studies.batch.ledger import CASES, TABLE
 from pathwalker_cli.studies.batch.table import CONVERGED, PENDING, read_metrics
 
@@ -54,25 +54,25 @@ def _counts(rows: Rows) -> dict[str, int]:
 
 
 def _warnings(counts: Mapping[str, int]) -> list[str]:
-    found = []
+    warnings = []
     if counts["Failed"]:
-        found.append(f"{counts['Failed']} cases failed: they have no gait and no springs")
+        warnings.append(f"{counts['Failed']} cases failed: they have no gait and no springs")
     if counts["Not yet run"]:
-        found.append(f"{counts['Not yet run']} cases have not been run yet")
-    return found
+        warnings.append(f"{counts['Not yet run']} cases have not been run yet")
+    return warnings
 
 
 def _quick_checks(tables: Mapping[Path, Rows]) -> list[str]:
     """Return a warning if cases are quick checks."""
-    found = [
+    quick = [
         metrics
         for folder, rows in tables.items()
         for row in rows
         if (metrics := read_metrics(folder / CASES / row["case"])) and metrics.get("smoke")
     ]
-    if not found:
+    if not quick:
         return []
-    return [f"{len(found)} cases are quick checks on coarse meshes: numbers for orientation only"]
+    return [f"{len(quick)} cases are quick checks on coarse meshes: numbers for orientation only"]
 
 
 def _section(folder: Path, rows: Rows) -> Section:
@@ -106,5 +106,5 @@ def _row(row: Mapping[str, str]) -> Row:
 
 def _pair(row: Mapping[str, str], stem: str, form: str, factor: float = 1.0) -> str:
     """Return the values of both sides, "-" where there are none."""
-    found = [number(row, f"{stem}_{side}", form, factor) for side in SIDES]
-    return "-" if set(found) == {"-"} else ", ".join(found)
+    values = [number(row, f"{stem}_{side}", form, factor) for side in SIDES]
+    return "-" if set(values) == {"-"} else ", ".join(values)

@@ -13,7 +13,7 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.config.values import differing_values
 from pathwalker_cli.evaluation.run import gaits_of_runs
 from pathwalker_cli.gait.costs import GOALS
-from pathwalker_cli.io.table import write_table
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.stride.measure import FORCE, LOADS, Measure
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.stride.stride import Stride

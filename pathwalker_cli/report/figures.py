@@ -102,22 +102,22 @@ def tradeoff_drawing(tradeoff: Tradeoff) -> Drawing:
     return _drawn(lambda: tradeoff_figure(tradeoff), "tradeoff", title, "tall")
 
 
-def spread_drawing(found: Spreads) -> Drawing:
+def spread_drawing(spreads: Spreads) -> Drawing:
     """Return where springs, cost and gait of all draws end up."""
     title = "Springs of all draws [N m/rad], and deviation of cost and gait from the base [%]"
     return _drawn(
-        lambda: spread_figure(found.values, found.ranges, found.spreads),
+        lambda: spread_figure(spreads.values, spreads.ranges, spreads.spreads),
         "uncertainty", title, "tall",
     )  # fmt: skip
 
 
 def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
     """Return the gaits of the runs over their recordings."""
-    found = [(run.evaluation.gait, run.evaluation.recorded) for run in runs]
-    if len(found) == 1:
-        gait, behind = found[0]
+    gaits_recorded = [(run.evaluation.gait, run.evaluation.recorded) for run in runs]
+    if len(gaits_recorded) == 1:
+        gait, behind = gaits_recorded[0]
         return (Trace(gait, gait.problem, behind),)
-    gaits, recorded = zip(*found, strict=True)
+    gaits, recorded = zip(*gaits_recorded, strict=True)
     return traces(gaits, [run.label for run in runs], recorded)
 
 

@@ -63,10 +63,10 @@ class Study:
     @property
     def optimum(self) -> Mapping[str, Any]:
         """Measures of the optimum that it stands on."""
-        found = self.content.get("optimum", self.content.get("base"))
-        if found is None and isinstance(start := self.content.get("start"), Mapping):
-            found = start.get("measures")
-        return found if isinstance(found, Mapping) else {}
+        measures = self.content.get("optimum", self.content.get("base"))
+        if measures is None and isinstance(start := self.content.get("start"), Mapping):
+            measures = start.get("measures")
+        return measures if isinstance(measures, Mapping) else {}
 
     def stands_on(self, metrics: Mapping[str, Any]) -> bool:
         """Return whether a run is the one around which the study was made."""
@@ -90,10 +90,10 @@ def folder_kind(folder: Path) -> Kind:
     if not folder.is_dir():
         what = "is a file" if folder.exists() else "no such folder"
         raise DataError(what, where=str(folder), allowed=_ALLOWED)
-    found = _kind(folder)
-    if found is None:
+    kind = _kind(folder)
+    if kind is None:
         raise DataError("holds nothing to report", where=str(folder), allowed=_ALLOWED)
-    return found
+    return kind
 
 
 def _kind(folder: Path) -> Kind | None:
@@ -106,28 +106,28 @@ def sorted_folders(folders: Sequence[Path]) -> dict[Kind, tuple[Path, ...]]:
     Raises:
         DataError: If one is named twice, is nothing to report, or they do not go together.
     """
-    found: dict[Kind, tuple[Path, ...]] = {}
+    by_kind: dict[Kind, tuple[Path, ...]] = {}
     places = [folder.resolve() for folder in folders]
     for folder, place in zip(folders, places, strict=True):
         if places.count(place) > 1:
             raise DataError("is named twice", where=str(folder), allowed="each folder once")
         kind = folder_kind(folder)
-        found[kind] = (*found.get(kind, ()), folder)
-    pages = [kind for kind in ("run", "recorded", "cohort") if kind in found]
-    studies = [kind for kind in found if kind in STUDIES]
+        by_kind[kind] = (*by_kind.get(kind, ()), folder)
+    pages = [kind for kind in ("run", "recorded", "cohort") if kind in by_kind]
+    studies = [kind for kind in by_kind if kind in STUDIES]
     if len(pages) > 1:
         raise DataError(
-            f"{found[pages[0]][0]} and {found[pages[1]][0]} do not go on one page",
+            f"{by_kind[pages[0]][0]} and {by_kind[pages[1]][0]} do not go on one page",
             allowed="runs with their studies, or folders of id, or folders of batch",
             mend="write a report for each",
         )
     if studies and pages != ["run"]:
         raise DataError(
             "is a study around a run that was not named",
-            where=str(found[studies[0]][0]),
+            where=str(by_kind[studies[0]][0]),
             mend="name the run too",
         )
-    return found
+    return by_kind
 
 
 def studies_near(
@@ -144,7 +144,7 @@ def studies_near(
     Raises:
         DataError: If a study that was named stands on none of the runs.
     """
-    found: dict[Kind, Study] = {}
+    studies: dict[Kind, Study] = {}
     for kind in STUDIES:
         for folder in named.get(kind, ()):
             study = _study(folder, kind)
@@ -154,16 +154,16 @@ def studies_near(
                     where=str(folder),
                     allowed="a study around one of them (--run RUN)",
                 )
-            if kind in found:
+            if kind in studies:
                 raise DataError(f"is a second {kind} study", where=str(folder), allowed="one")
-            found[kind] = study
+            studies[kind] = study
     for folder, metrics in runs:
         for kind, place in _near_folders(folder):
             with suppress(DataError):  # nobody named it
                 study = _study(place, kind)
-                if kind not in found and study.stands_on(metrics):
-                    found[kind] = study
-    return tuple(found[kind] for kind in STUDIES if kind in found)
+                if kind not in studies and study.stands_on(metrics):
+                    studies[kind] = study
+    return tuple(studies[kind] for kind in STUDIES if kind in studies)
 
 
 def _study(folder: Path, kind: Kind) -> Study:

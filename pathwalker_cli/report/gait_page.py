@@ -29,8 +29,8 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
         studies: Studies around one of them.
     """
     patient, changes = runs[0].patient, changes_of(runs)
-    worn = [run for run in runs if run.worn]
-    sections = [spring_section(run) for run in worn]
+    with_orthoses = [run for run in runs if run.worn]
+    sections = [spring_section(run) for run in with_orthoses]
     sections += [gait_section(runs, changes), curve_section(runs)]
     sections += [study_section(study, _base(study, runs)) for study in studies]
     sections.append(assumption_section(runs))
@@ -41,7 +41,7 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
         Fact("Height", f"{patient.height:g} m"),
         *_of_runs(runs),
     )
-    answer = " ".join(_answer(run, changes) for run in worn or runs)
+    answer = " ".join(_answer(run, changes) for run in with_orthoses or runs)
     return Page(f"Gait of {patient.id}", facts, answer, tuple(_warnings(runs)), tuple(sections))
 
 
@@ -101,25 +101,25 @@ def _springs(run: ReportRun) -> str:
 
 def _warnings(runs: Sequence[ReportRun]) -> list[str]:
     """Return what must be known before the answer is used."""
-    found = []
+    warnings = []
     for run in runs:
         if run.run.config.smoke:
-            found.append(
+            warnings.append(
                 f"{run.label}: a quick check on a coarse mesh: numbers for orientation only"
             )
         if run.verdict is not None and (warning := snapped_warning(run.verdict)):
-            found.append(f"{run.label}, springs to take: {warning}")
+            warnings.append(f"{run.label}, springs to take: {warning}")
         if _coarse(run):
-            found.append(
+            warnings.append(
                 f"{run.label}: an independent integrator misses the mesh by more than the config "
                 "asks for: the mesh is too coarse"
             )
         if run.patient_changed:
-            found.append(
+            warnings.append(
                 f"{run.label}: the patient's file is no longer that of the run; this page is about "
                 "the patient of the run"
             )
-    return found
+    return warnings
 
 
 def _coarse(run: ReportRun) -> bool:

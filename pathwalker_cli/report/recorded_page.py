@@ -12,9 +12,9 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.inverse.recorded_read import read_trials
 from pathwalker_cli.inverse.recorded_study import ORIGIN
+from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
-from pathwalker_cli.report.csv_table import number, read_rows
 from pathwalker_cli.report.figures import torque_drawing
 
 __all__ = ["recorded_page"]
@@ -79,25 +79,25 @@ def _sections(folder: Path, origin: Mapping[str, Any], index: int) -> list[Secti
             ("Method", "method", ""),
         )
     )  # fmt: skip
-    found = [Section(f"Recorded stances, {who}", facts=facts, tables=(_stance_table(stances),))]
+    sections = [Section(f"Recorded stances, {who}", facts=facts, tables=(_stance_table(stances),))]
     drawings = [
         drawing
         for condition in CONDITIONS
         for drawing in _torques(folder, condition, stances, origin, index)
     ]
     if drawings:
-        found.append(Section(f"Net joint torques, {who}", drawings=tuple(drawings)))
+        sections.append(Section(f"Net joint torques, {who}", drawings=tuple(drawings)))
     if (folder / "strengths.csv").is_file():
         rows = read_rows(folder / "strengths.csv", _STRENGTHS)
-        found.append(Section(f"Muscle strengths, {who}", tables=(_strength_table(rows),)))
+        sections.append(Section(f"Muscle strengths, {who}", tables=(_strength_table(rows),)))
     if (folder / "residuals.csv").is_file():
         rows = read_rows(folder / "residuals.csv", _RESIDUALS)
-        found.append(Section(f"Pelvis residuals, {who}", tables=(_residual_table(rows),)))
+        sections.append(Section(f"Pelvis residuals, {who}", tables=(_residual_table(rows),)))
     notes = [str(note) for note in origin.get("notes") or ()]
     versions = ", ".join(f"{n} {v}" for n, v in (origin.get("versions") or {}).items())
     lines = (*(f"{note}." for note in notes), *([f"Versions: {versions}."] if versions else []))
-    found.append(Section(f"What was assumed, {who}", tuple(lines)))
-    return found
+    sections.append(Section(f"What was assumed, {who}", tuple(lines)))
+    return sections
 
 
 def _plain(value: Any) -> str:
@@ -106,7 +106,7 @@ def _plain(value: Any) -> str:
 
 def _stance_table(rows: Rows) -> Table:
     """Return how many stances were recorded and measured, and why the others were not."""
-    found = []
+    table_rows = []
     for condition in dict.fromkeys(row["condition"] for row in rows):
         for side in SIDES:
             own = [r for r in rows if (r["condition"], r["side"]) == (condition, side)]
@@ -115,9 +115,9 @@ def _stance_table(rows: Rows) -> Table:
             reasons = "; ".join(f"{count}: {reason}" for reason, count in why.most_common())
             trials = len({row["trial"] for row in own})
             cells = (condition, side, str(trials), str(len(own)), str(len(known)), reasons or "-")
-            found.append(Row(cells))
+            table_rows.append(Row(cells))
     head = ("condition", "side", "trials", "stances", "measured", "why not measured")
-    return Table(head, tuple(found), columns="wwnnnp")
+    return Table(head, tuple(table_rows), columns="wwnnnp")
 
 
 def _torques(
@@ -146,7 +146,7 @@ def _measured(trial: StudyTrial) -> bool:
 
 def _strength_table(rows: Rows) -> Table:
     """Return the maximum isometric torques beside those of the patient's file."""
-    found = tuple(
+    table_rows = tuple(
         Row(
             (
                 _muscles(row["generator"]),
@@ -162,7 +162,7 @@ def _strength_table(rows: Rows) -> Table:
     )
     head = ("muscle group", "strength [N m]", "patient's file [N m]", "deviation [%]", "stances",
             "single stances [N m]", "remark")  # fmt: skip
-    return Table(head, found, columns="wnnnnnp")
+    return Table(head, table_rows, columns="wnnnnnp")
 
 
 def _muscles(generator: str) -> str:
@@ -181,7 +181,7 @@ def _span(row: Mapping[str, str]) -> str:
 
 def _residual_table(rows: Rows) -> Table:
     """Return what inverse dynamics leaves over, means over trials."""
-    found = tuple(
+    table_rows = tuple(
         Row(
             (
                 f"{row['condition']}, {row['part']}, {row['trial']}",
@@ -193,4 +193,4 @@ def _residual_table(rows: Rows) -> Table:
         for row in rows
         if row["trial"].endswith("over trials")
     )
-    return Table(("", "forward [N]", "up [N]", "moment [N m]"), found)
+    return Table(("", "forward [N]", "up [N]", "moment [N m]"), table_rows)

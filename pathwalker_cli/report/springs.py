@@ -79,7 +79,7 @@ def _identified(run: ReportRun, name: str) -> float:
 
 def _row(run: ReportRun, name: str) -> Row:
     """Return the row of one spring."""
-    take, found, verdict = recommended(run)[name], _identified(run, name), run.verdict
+    take, identified, verdict = recommended(run)[name], _identified(run, name), run.verdict
     spring = next((s for s in verdict.springs if s.name == name), None) if verdict else None
     snapped = verdict.snapped.names.get(name, "") if verdict and verdict.snapped else ""
     region = ("-", "-")
@@ -90,7 +90,7 @@ def _row(run: ReportRun, name: str) -> Row:
         low, high = spring.region
         region = f"{low:.1f} to {high:.1f}", f"{per_degree(low):.2f} to {per_degree(high):.2f}"
     label = measure_of(name).label
-    cells = (label, snapped or "-", f"{take:.1f}", f"{per_degree(take):.2f}", f"{found:.1f}",
+    cells = (label, snapped or "-", f"{take:.1f}", f"{per_degree(take):.2f}", f"{identified:.1f}",
              *region, words)  # fmt: skip
     return Row(cells, "good" if snapped else "")
 
@@ -120,9 +120,9 @@ def _facts(verdict: Verdict) -> list[Fact]:
         others = "not searched for (starts: 8 does)"
     facts = [Fact("Real springs", real), Fact("Other optima", others)]
     doubts = [
-        f"{measure_of(s.name).label}: {'; '.join(found)}"
+        f"{measure_of(s.name).label}: {'; '.join(doubts_of)}"
         for s in verdict.springs
-        if (found := list(reservations(s)))
+        if (doubts_of := list(reservations(s)))
     ]
     if doubts:
         facts.append(Fact("Limits and doubts", ". ".join(doubts)))

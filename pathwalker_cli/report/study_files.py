@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pathwalker_cli.report.csv_table import read_rows
+from pathwalker_cli.io.csv_file import read_rows
 from pathwalker_cli.report.folders import Study
 from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
@@ -97,8 +97,8 @@ def spreads_of(study: Study) -> Spreads:
         KeyError, TypeError, ValueError: If its files are not those of `uncertainty`.
     """
     content = study.content
-    told: dict[str, dict[str, Any]] = content["spreads"]
-    rows = read_rows(study.folder / "draws.csv", ("draw", "status", *told))
+    entries: dict[str, dict[str, Any]] = content["spreads"]
+    rows = read_rows(study.folder / "draws.csv", ("draw", "status", *entries))
     solved = [row for row in rows if row["cost"]]
     spreads = tuple(
         Spread(
@@ -113,13 +113,13 @@ def spreads_of(study: Study) -> Spreads:
             correlations=np.zeros(0),
             strongest=None,
         )
-        for key, entry in told.items()
+        for key, entry in entries.items()
     )
     return Spreads(
-        values={key: np.array([float(row[key]) for row in solved]) for key in told},
+        values={key: np.array([float(row[key]) for row in solved]) for key in entries},
         ranges={name: (pair[0], pair[1]) for name, pair in content["stiffness_ranges"].items()},
         spreads=spreads,
-        strongest={k: e["strongest_input"] for k, e in told.items() if e["strongest_input"]},
+        strongest={k: e["strongest_input"] for k, e in entries.items() if e["strongest_input"]},
         draws=int(content["draws"]),
         failed=len(content["failed"]),
     )

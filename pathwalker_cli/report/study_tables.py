@@ -56,14 +56,14 @@ def study_section(study: Study, run: ReportRun) -> Section:
 
 def _sensitivity(study: Study, run: ReportRun) -> Section:
     """Return what one per cent more of every number changes."""
-    found: Mapping[str, Mapping[str, Any]] = study.content["elasticities"]
+    elasticities: Mapping[str, Mapping[str, Any]] = study.content["elasticities"]
     shown = [
         m
         for m in measures_in("studies")
-        if any(_moves(values.get(m.key)) for values in found.values())
+        if any(_moves(values.get(m.key)) for values in elasticities.values())
     ]
     rows = []
-    for place, values in found.items():
+    for place, values in elasticities.items():
         numbers = [values.get(measure.key) for measure in shown]
         if any(map(_moves, numbers)):
             rows.append(Row((label_of(place), *map(_elasticity, numbers))))
@@ -113,24 +113,28 @@ def _change(share: float | None) -> str:
 
 def _landscape(study: Study, run: ReportRun) -> Section:
     """Return the cost over K_D and K_P as a map, with the region of nearly best springs."""
-    found = landscape_of(study)
+    landscape = landscape_of(study)
     orthosis = run.patient.orthosis
     springs = None if orthosis is None else orthosis.springs
-    best, region = found.best, found.region
-    lines = [f"Least cost at K_D {best.k_d:.1f}, K_P {best.k_p:.1f} N m/rad ({_side(found.side)})."]
+    best, region = landscape.best, landscape.region
+    lines = [
+        f"Least cost at K_D {best.k_d:.1f}, K_P {best.k_p:.1f} N m/rad ({_side(landscape.side)})."
+    ]
     if region is not None:
         lines.append(
-            f"Within {100 * found.tolerance:g} % of it: K_D {region.k_d[0]:.1f} to "
+            f"Within {100 * landscape.tolerance:g} % of it: K_D {region.k_d[0]:.1f} to "
             f"{region.k_d[1]:.1f}, K_P {region.k_p[0]:.1f} to {region.k_p[1]:.1f} N m/rad, "
             f"{100 * region.share:.0f} % of the grid points."
         )
-    top = np.nanmax(found.increase)
+    top = np.nanmax(landscape.increase)
     lines.append(f"The most expensive point costs {100 * top:.1f} % more than the best.")
-    if found.branched:
-        lines.append(f"Several local optima at {len(found.branched)} of {len(found.bests)} points.")
-    if found.failed:
-        lines.append(f"No solution at {len(found.failed)} of {len(found.bests)} points.")
-    drawing = landscape_drawing(found, springs, _chosen(run, found.side))
+    if landscape.branched:
+        lines.append(
+            f"Several local optima at {len(landscape.branched)} of {len(landscape.bests)} points."
+        )
+    if landscape.failed:
+        lines.append(f"No solution at {len(landscape.failed)} of {len(landscape.bests)} points.")
+    drawing = landscape_drawing(landscape, springs, _chosen(run, landscape.side))
     return Section("Landscape of the springs", tuple(lines), drawings=(drawing,))
 
 
@@ -152,56 +156,56 @@ def _side(side: str) -> str:
 
 def _tradeoff(study: Study, run: ReportRun) -> Section:
     """Return the front of speed and effort, and the springs along it."""
-    found = tradeoff_of_content(study.content)
-    springs = STIFFNESSES if found.condition == "orthosis" else ()
+    tradeoff = tradeoff_of_content(study.content)
+    springs = STIFFNESSES if tradeoff.condition == "orthosis" else ()
     head = ("weight of speed [s^2/m^2]", "speed [m/s]", "effort [s/m]",
             *(f"{measure_of(name).short} [N m/rad]" for name in springs), "remark")  # fmt: skip
     rows = []
-    for point in found.points:
+    for point in tradeoff.points:
         if point.solved:
             numbers = [f"{point.speed:.3f}", f"{point.effort:.3f}"]
             numbers += [f"{point.measures[name]:.1f}" for name in springs]
         else:
             numbers = ["-"] * (2 + len(springs))
-        cells = (f"{point.weight:g}", *numbers, _remark(found, point))
+        cells = (f"{point.weight:g}", *numbers, _remark(tradeoff, point))
         rows.append(Row(cells, "" if point.solved else "failed"))
     table = Table(head, tuple(rows), columns=f"w{'n' * (len(head) - 2)}p")
     lines = [
         "How much effort a faster gait takes: the objective weighs speed more and more. A "
         "dominated point is no faster and no cheaper than another one."
     ]
-    drawings = (tradeoff_drawing(found),) if found.solved else ()
+    drawings = (tradeoff_drawing(tradeoff),) if tradeoff.solved else ()
     return Section("Trade-off of speed and effort", tuple(lines), tables=(table,),
                    drawings=drawings)  # fmt: skip
 
 
-def _remark(found: Tradeoff, point: FrontPoint) -> str:
+def _remark(tradeoff: Tradeoff, point: FrontPoint) -> str:
     """Return what to know about a point of a front, "" for nothing."""
     if not point.solved:
         return point.status
-    remarks = ["dominated"] * found.dominated(point)
+    remarks = ["dominated"] * tradeoff.dominated(point)
     remarks += ["mesh too coarse: rough numbers"] * (point.mesh_status == "inaccurate")
     return "; ".join(remarks)
 
 
 def _uncertainty(study: Study, run: ReportRun) -> Section:
     """Return how far springs and gait spread when the patient's numbers are uncertain."""
-    found = spreads_of(study)
+    spreads = spreads_of(study)
     head = ("", "unit", "base", "median", "90 % of draws", "follows most")
-    table = Table(head, tuple(_spread_row(found, each) for each in found.spreads),
+    table = Table(head, tuple(_spread_row(spreads, each) for each in spreads.spreads),
                   columns="wwnnnp")  # fmt: skip
-    count = found.draws - found.failed
-    lines = [f"{found.draws} draws of the uncertain numbers, {count} converged."]
-    lines += [words for each in found.spreads if (words := _chance(found, each))]
-    drawings = (spread_drawing(found),) if count else ()
+    count = spreads.draws - spreads.failed
+    lines = [f"{spreads.draws} draws of the uncertain numbers, {count} converged."]
+    lines += [words for each in spreads.spreads if (words := _chance(spreads, each))]
+    drawings = (spread_drawing(spreads),) if count else ()
     return Section("Uncertainty of the patient's numbers", tuple(lines), tables=(table,),
                    drawings=drawings)  # fmt: skip
 
 
-def _spread_row(found: Spreads, spread: Spread) -> Row:
+def _spread_row(spreads: Spreads, spread: Spread) -> Row:
     measure = spread.measure
     low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
-    place = found.strongest.get(measure.key)
+    place = spreads.strongest.get(measure.key)
     return Row((
         measure.label, measure.shown_unit,
         shown_text(measure, spread.base), middle, f"{low} to {high}",
@@ -209,12 +213,12 @@ def _spread_row(found: Spreads, spread: Spread) -> Row:
     ))  # fmt: skip
 
 
-def _chance(found: Spreads, spread: Spread) -> str:
+def _chance(spreads: Spreads, spread: Spread) -> str:
     """Return in words how often a spring sits at a limit, "" for other measures."""
     key, label = spread.measure.key, spread.measure.label
-    if key not in found.ranges:
+    if key not in spreads.ranges:
         return ""
-    low, high = found.ranges[key]
+    low, high = spreads.ranges[key]
     if low == high:
         return f"{label} is prescribed: {low:g} N m/rad."
     if spread.lower is None or spread.upper is None:
@@ -223,5 +227,5 @@ def _chance(found: Spreads, spread: Spread) -> str:
     parts = [(spread.upper, f"the stiffest ({high:g} N m/rad)"),
              (spread.lower, f"the softest ({low:g} N m/rad)"),
              (inside, "one between")]  # fmt: skip
-    told = ", ".join(f"{words} in {100 * share:.0f} %" for share, words in parts if share > 0.0)
-    return f"{label}: least effort takes {told} of the draws."
+    shares = ", ".join(f"{words} in {100 * share:.0f} %" for share, words in parts if share > 0.0)
+    return f"{label}: least effort takes {shares} of the draws."

@@ -1,9 +1,10 @@
-"""Every number of the article beside ours."""
+"""Every number of the article beside ours, and why the two differ as far as that is known."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -14,16 +15,106 @@ from pathwalker_cli.evaluation.paper import NUMBERS, PaperNumber
 from pathwalker_cli.evaluation.recorded import RecordedGait, Spread, recorded_numbers
 from pathwalker_cli.inverse.bands import cycle_band
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.reproduce.inverse_study import InverseResult
-from pathwalker_cli.reproduce.reasons import NOT_COMPUTED, reason_for
-from pathwalker_cli.reproduce.results import ProblemResult, Results
+from pathwalker_cli.reproduce.results import InverseResult, ProblemResult, Results
 
-__all__ = ["Ours", "Row", "all_rows", "number_rows"]
+__all__ = ["Ours", "Row", "all_rows"]
 
-_HEALTHY: Final = "sreenivasa2017-healthy"
-_INVERSE: Final = ("residual_", "max_isometric_torque_")
-"""Quantities that inverse dynamics gives, by two methods."""
-_JOINTS: Final = ("pelvis", "hip", "knee", "ankle")
+_PREDICTED: Final = ("mapd-barefoot", "mapd-orthosis", "mapd-ws-orthosis")
+_RECORDED: Final = ("recorded-barefoot", "recorded-orthosis")
+_BOUNDS: Final = "the authors' bounds are not published"
+
+Spreads = Mapping[str, Mapping[str, Spread]]
+"""Recorded numbers by condition and quantity."""
+Reasons = Sequence[tuple[tuple[str, ...], Mapping[str, str]]]
+"""Subjects of `paper.NUMBERS`, and texts by the beginning of a quantity; the first one counts."""
+
+_REASONS: Final[Reasons] = (
+    (
+        ("healthy",),
+        {
+            "max_isometric_torque": "an input of the model: the value in the patient's file that "
+            "comes with PathWalker"
+        },
+    ),
+    (
+        ("patient",),
+        {
+            "max_isometric_torque_ankle": "which peaks entered the table is not said; the ankle's "
+            "is ill-conditioned",
+            "max_isometric_torque": "default: filtered motion and other stances; single stances "
+            "scatter widely",
+        },
+    ),
+    (
+        ("recorded",),
+        {
+            "residual_force_limit": "largest mean of a trial, per body mass, printed as N; default "
+            "counts measured frames only",
+            "residual_moment_limit": "largest mean of a trial, per body mass, printed as N m; "
+            "table 3 itself has 0.15",
+            "residual_over_peak_force": "largest mean residual of a trial over the mean peak of "
+            "measured stances; the article compares 3.3 N/kg with N",
+        },
+    ),
+    (
+        _RECORDED,
+        {
+            "residual_up": "per body mass, printed as N; default counts measured frames only, "
+            "published also support that no plate felt",
+            "residual_": "per body mass, printed as N and N m; default: filtered motion, measured "
+            "frames only",
+            "largest_deviation": "how they were taken is not said; ours: largest standard "
+            "deviation between strides in the gait cycle, least and greatest of pelvis, hip, "
+            "knee, ankle",
+            "ankle_torque_slope": "how it was taken is not said; ours: mean over measured stances "
+            "of least-squares lines",
+            "": "ours: all recordings; which ones the article counted is not said",
+        },
+    ),
+    (
+        ("ls-barefoot",),
+        {
+            "rms_one_trial": "the right heel of the published fit slides on the ground, ours may "
+            "not",
+            "rms_vertical_force": "how forces were averaged is not said; the published motion does "
+            "not give it either",
+        },
+    ),
+    (("mapd-ws-orthosis",), {"walking_speed": f"lambda rewards speed; {_BOUNDS}"}),
+    (
+        _PREDICTED,
+        {
+            "rms_one_trial": f"to one trial at equal time, as computed there; {_BOUNDS}",
+            "rms_vertical_force": f"how forces were averaged is not said; {_BOUNDS}",
+            "walking_speed_weight": "an input of the problem",
+            "walking_speed": f"least effort walks as slowly as it may; {_BOUNDS}",
+            "seconds_solve": "other solver, transcription and hardware",
+            "effort_per_distance": f"{_BOUNDS}; nothing published with the article allows to "
+            "check it",
+            "ankle_torque_slope": f"how it was taken is not said; {_BOUNDS}",
+            "": _BOUNDS,
+        },
+    ),
+    (
+        ("change",),
+        {
+            "min_stance_knee_flexion": "both knees of the published barefoot gait rest on a bound "
+            "of 0.6 rad, which makes the printed change"
+        },
+    ),
+)
+
+_NOT_COMPUTED: Final[Reasons] = (
+    (
+        ("mapd-orthosis",),
+        {
+            "largest_change_after": "not computed: the perturbation analysis is no part of this "
+            "command"
+        },
+    ),
+    (("literature",), {"": "not computed: a number of other works"}),
+)
+"""Numbers for which nothing is computed, and why."""
 
 
 @dataclass(frozen=True)
@@ -65,153 +156,128 @@ class Row:
 
 def all_rows(results: Results) -> tuple[Row, ...]:
     """Return a row for every number of the article, two where two methods give it."""
-    return tuple(number_rows(NUMBERS, results))
-
-
-def number_rows(numbers: Iterable[PaperNumber], results: Results) -> Iterator[Row]:
-    """Yield the rows of some numbers."""
     spreads = {str(name): recorded_numbers(gait) for name, gait in results.recorded.items()}
-    for number in numbers:
-        if number.subject != "healthy" and number.quantity.startswith(_INVERSE):
-            for method, found in results.inverse.items():
-                ours = found if isinstance(found, str) else _inverse(number, found, results)
-                yield Row(number, ours, method, reason_for(number))
-            continue
-        ours = _ours(number, results, spreads)
-        yield Row(number, ours, "", _why(number, results))
+    rows = []
+    for number in NUMBERS:
+        inverse = number.quantity.startswith(("residual_", "max_isometric_torque_"))
+        if inverse and number.subject != "healthy":
+            for method, result in results.inverse.items():
+                ours = result if isinstance(result, str) else _inverse(number, result, results)
+                rows.append(Row(number, ours, method, _reason(number, _REASONS)))
+        else:
+            left_out = _reason(number, _NOT_COMPUTED)
+            ours = left_out or _ours(number, results, spreads)
+            rows.append(Row(number, ours, "", _why(number, results)))
+    return tuple(rows)
 
 
-def _ours(
-    number: PaperNumber, results: Results, spreads: Mapping[str, Mapping[str, Spread]]
-) -> Ours | str:
+def _reason(number: PaperNumber, reasons: Reasons) -> str:
+    """Return the text about a number, "" if there is none."""
+    texts = (
+        text
+        for subjects, group in reasons
+        for begin, text in group.items()
+        if number.subject in subjects and number.quantity.startswith(begin)
+    )
+    return next(texts, "")
+
+
+def _ours(number: PaperNumber, results: Results, spreads: Spreads) -> Ours | str:
     """Return our value of a number that does not come from inverse dynamics."""
-    left_out = next((each for each in NOT_COMPUTED if each.covers(number)), None)
-    if left_out is not None:
-        return left_out.text
     if number.subject == "healthy":
-        strengths = load_patient(_HEALTHY).max_isometric_torque
+        strengths = load_patient("sreenivasa2017-healthy").max_isometric_torque
         name = number.quantity.removeprefix("max_isometric_torque_")
         return Ours(float(strengths[GENERATORS.index(name)]))
     if number.subject == "change":
-        return _change(number, results)
+        values = {change.measure.key: change.value for change in results.changes}
+        why = "mapd-barefoot and mapd-orthosis did not both converge"
+        return _known(values.get(number.quantity), why)
     if number.subject in results.problems:
         return _gait(number, results.problems[number.subject])
     return _recorded(number, results, spreads)
 
 
-def _inverse(number: PaperNumber, found: InverseResult, results: Results) -> Ours | str:
+def _known(value: float | None, why: str) -> Ours | str:
+    """Return a value, or why there is none."""
+    return f"not computed: {why}" if value is None else Ours(float(value))
+
+
+def _inverse(number: PaperNumber, result: InverseResult, results: Results) -> Ours | str:
     """Return what one method of inverse dynamics says."""
-    values = found.residuals
+    known = partial(_known, why="inverse dynamics gives none")
+    name = number.quantity.removeprefix("max_isometric_torque_").removeprefix("residual_")
     if number.subject == "patient":
-        name = number.quantity.removeprefix("max_isometric_torque_")
-        return _known(found.strengths.get(name))
-    if number.subject == "recorded":
-        moment = number.quantity == "residual_moment_limit"
-        parts = ("_moment_",) if moment else ("_forward_", "_up_")
-        largest = max(
-            (abs(v) for key, v in values.items() if any(part in key for part in parts)),
-            default=None,
-        )
-        if number.quantity != "residual_over_peak_force" or largest is None:
-            return _known(largest)
-        peaks = _peak_forces(results)
-        return Ours(largest * found.body_mass / peaks) if peaks else "not computed: no forces"
-    condition = number.subject.removeprefix("recorded-")
-    return _known(values.get(f"{condition}_{number.quantity.removeprefix('residual_')}"))
-
-
-def _known(value: float | None) -> Ours | str:
-    """Return a value, or that there is none."""
-    return "not computed: inverse dynamics gives none" if value is None else Ours(value)
-
-
-def _peak_forces(results: Results) -> float | None:
-    """Return the mean of the peak vertical forces of all measured stances [N], or None."""
-    peaks = [
-        float(curve[:, 1].max())
-        for gait in results.recorded.values()
-        for side in SIDES
-        for curve in gait.stance_forces(side)
-    ]
-    return float(np.mean(peaks)) if peaks else None
-
-
-def _change(number: PaperNumber, results: Results) -> Ours | str:
-    """Return a change from barefoot to orthosis."""
-    found = next((c for c in results.changes if c.measure.key == number.quantity), None)
-    if found is None:
-        return "not computed: mapd-barefoot and mapd-orthosis did not both converge"
-    return Ours(found.value)
+        return known(result.strengths.get(name))
+    if number.subject != "recorded":
+        return known(result.residuals.get(f"{number.subject.removeprefix('recorded-')}_{name}"))
+    parts = ("_moment_",) if name == "moment_limit" else ("_forward_", "_up_")
+    largest = max(
+        (abs(v) for key, v in result.residuals.items() if any(part in key for part in parts)),
+        default=None,
+    )
+    if name != "over_peak_force" or largest is None:
+        return known(largest)
+    curves = [c for g in results.recorded.values() for s in SIDES for c in g.stance_forces(s)]
+    if not curves:
+        return "not computed: no forces"
+    peak = float(np.mean([curve[:, 1].max() for curve in curves]))
+    return Ours(largest * result.body_mass / peak)
 
 
 def _gait(number: PaperNumber, result: ProblemResult) -> Ours | str:
     """Return a number of a solved problem."""
     if result.evaluation is None:
         return f"not computed: {result.problem} did not converge"
-    if number.quantity == "seconds_solve":
-        return Ours(float(result.metrics["seconds_solve"]))
-    if number.quantity == "walking_speed_weight":
-        return Ours(float(result.config.cost.walking_speed_weight))
-    rows = {row.measure.key: row.value for row in result.evaluation.rows}
-    value = rows.get(number.quantity)
-    return "not computed: the run does not tell" if value is None else Ours(value)
+    values = {row.measure.key: row.value for row in result.evaluation.rows}
+    values["seconds_solve"] = result.metrics["seconds_solve"]
+    values["walking_speed_weight"] = result.config.cost.walking_speed_weight
+    return _known(values.get(number.quantity), "the run does not tell")
 
 
-def _recorded(
-    number: PaperNumber, results: Results, spreads: Mapping[str, Mapping[str, Spread]]
-) -> Ours | str:
+def _recorded(number: PaperNumber, results: Results, spreads: Spreads) -> Ours | str:
     """Return what the recordings say."""
     condition = number.subject.removeprefix("recorded-")
     if number.quantity == "largest_deviation" and condition in spreads:
         return _largest_deviation(results.recorded["barefoot"])
-    found = spreads.get(condition, {}).get(number.quantity)
-    if found is None:
+    spread = spreads.get(condition, {}).get(number.quantity)
+    if spread is None:
         return "not computed: the recordings do not tell"
     if number.quantity.startswith("ankle_torque_slope"):
-        return Ours(found.mean)
-    return Ours(found.mean, found.low, found.high)
+        return Ours(spread.mean)
+    return Ours(spread.mean, spread.low, spread.high)
 
 
 def _largest_deviation(recorded: RecordedGait) -> Ours:
     """Return the largest standard deviation over the cycle of the least and greatest joint."""
-    largest: dict[str, list[float]] = {}
+    largest = {"pelvis": 0.0, "hip": 0.0, "knee": 0.0, "ankle": 0.0}
     for side in SIDES:
         band = cycle_band([(trial.motion, trial.cycles) for trial in recorded.trials], side)
-        for joint in _JOINTS:
+        for joint in largest:
             names = [n for n in JOINTS[joint] if len(JOINTS[joint]) == 1 or n[-1] == SUFFIX[side]]
             columns = [COORDINATES.index(name) for name in names]
-            largest.setdefault(joint, []).append(float(band.deviation[:, columns].max()))
-    values = [max(found) for found in largest.values()]
+            largest[joint] = max(largest[joint], float(band.deviation[:, columns].max()))
+    values = [*largest.values()]
     return Ours(float(np.mean(values)), min(values), max(values))
 
 
 def _why(number: PaperNumber, results: Results) -> str:
     """Return the known reason, and which bound this very run rests on."""
-    parts = [_resting(number, results), reason_for(number), _over_cycle(number, results)]
+    reason, result = _reason(number, _REASONS), results.problems.get(number.subject)
+    if result is None or result.evaluation is None:
+        return reason
+    parts = [_resting(number, result), reason]
+    if number.quantity.startswith("rms_one_trial_"):  # as the article words it
+        key = number.quantity.replace("one_trial", "mean_cycle")
+        parts += [
+            f"to the mean recorded gait cycle ours is {float(to_degrees(row.value)):.2f}"
+            for row in result.evaluation.rows
+            if row.measure.key == key and row.value is not None
+        ]
     return "; ".join(part for part in parts if part)
 
 
-def _over_cycle(number: PaperNumber, results: Results) -> str:
-    """Return a difference of joint angles to the mean recorded cycle, as the article words it."""
-    result = results.problems.get(number.subject)
-    if not number.quantity.startswith("rms_one_trial_") or result is None:
-        return ""
-    key = number.quantity.replace("one_trial", "mean_cycle")
-    found = (
-        [row.value for row in result.evaluation.rows if row.measure.key == key]
-        if result.evaluation
-        else []
-    )
-    if not found or found[0] is None:
-        return ""
-    return f"to the mean recorded gait cycle ours is {float(to_degrees(found[0])):.2f}"
-
-
-def _resting(number: PaperNumber, results: Results) -> str:
+def _resting(number: PaperNumber, result: ProblemResult) -> str:
     """Return that a quantity sits at its bound in this run, "" if it does not."""
-    result = results.problems.get(number.subject)
-    if result is None or not result.converged:
-        return ""
     for bound in result.bounds:
         if bound.name == number.quantity:
             return f"ours rests on its {bound.side} bound, {bound.value:.4g} {number.unit}"

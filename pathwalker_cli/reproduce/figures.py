@@ -9,20 +9,30 @@ from pathlib import Path
 from typing import Final
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side, to_degrees
 from pathwalker_cli.evaluation.curves import ANGLES, FORCES, CycleCurve, Trace
 from pathwalker_cli.evaluation.figures import ankle_figure, cycle_figure
-from pathwalker_cli.reproduce.muscle_figures import (
-    activation_figure,
-    curve_figure,
-    muscle_torque_figure,
-)
+from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.reproduce.results import ProblemResult, Results
 from pathwalker_cli.stride.figures import orthosis_curves
+from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION
 from pathwalker_cli.stride.figures.save import save_formats
-from pathwalker_cli.stride.figures.style import STYLE
+from pathwalker_cli.stride.figures.style import (
+    NEUTRAL,
+    STYLE,
+    dress,
+    legend,
+    new_figure,
+    percent_axis,
+    zero_line,
+)
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import own_cycle
 
 __all__ = ["save_paper_figures"]
 
@@ -77,7 +87,12 @@ def _plans(results: Results) -> Iterator[_Plan]:
         curve_figure,
     )
     if "mapd-orthosis" in solved:
-        yield _orthosis(solved["mapd-orthosis"])
+        springs = _series(solved["mapd-orthosis"])
+        yield _Plan(
+            "figure-2",
+            "Figure 2: torque over angle of the orthoses, with the springs of MAPD-Orthosis.",
+            lambda: orthosis_curves(springs),
+        )
     yield from _kinds(solved, "figure-3", "joint angles", ANGLES)
     yield from _kinds(solved, "figure-4", "ground reaction forces", FORCES)
     if {"mapd-barefoot", "mapd-orthosis"} <= solved.keys():
@@ -101,13 +116,6 @@ def _plans(results: Results) -> Iterator[_Plan]:
             "with orthoses.",
             lambda: ankle_figure(trace),
         )
-
-
-def _orthosis(result: ProblemResult) -> _Plan:
-    """Return the plan of figure 2."""
-    series = _series(result)
-    caption = "Figure 2: torque over angle of the orthoses, with the springs of MAPD-Orthosis."
-    return _Plan("figure-2", caption, lambda: orthosis_curves(series))
 
 
 def _kinds(
@@ -137,3 +145,116 @@ def _trace(result: ProblemResult) -> Trace:
         raise ValueError(f"{result.problem} did not converge")
     gait = result.evaluation.gait
     return Trace(gait, gait.problem, result.evaluation.recorded)
+
+
+_BAREFOOT: Final = {"color": "#D55E00", "linestyle": "--"}
+_ORTHOSIS: Final = {"color": "#0072B2", "linestyle": "-"}
+"""Looks of the two gaits, told apart with any colour vision and without colour."""
+_DIRECTIONS: Final = ("extension", "flexion")
+_LOOK: Final = {"extension": _ORTHOSIS, "flexion": _BAREFOOT}
+_ANGLES: Final = {"hip": (-40.0, 115.0), "knee": (-20.0, 115.0), "ankle": (-60.0, 60.0)}
+"""Flexion and dorsiflexion over which curves are drawn [deg]."""
+_TORQUE: Final = "muscle torque [N m]"
+_LARGEST_SPEED: Final = 12.0
+"""Angular velocity up to which curves are drawn [rad/s]."""
+
+
+def curve_figure() -> Figure:
+    """Return the torque-angle and torque-velocity curves of hip, knee and ankle.
+
+    Shares of the maximum isometric torque; flexion and dorsiflexion angles are positive, and so is
+    the velocity of shortening.
+    """
+    fig = new_figure(4.4)
+    grid = fig.subplots(3, 2, sharey="col")
+    by_name = {each.name: each for each in generators()}
+    angle, speed = np.linspace(-2.0, 2.0, 401), np.linspace(-_LARGEST_SPEED, _LARGEST_SPEED, 401)
+    for row, joint in enumerate(LEG_JOINTS):
+        for direction in _DIRECTIONS:
+            generator, look = by_name[f"{joint}_{direction}_r"], _LOOK[direction]
+            shown = CLINICAL_ANGLE[joint] * to_degrees(angle)
+            force = np.array([float(generator.angle_factor(q)) for q in angle])
+            grid[row][0].plot(shown, force, **look)
+            velocity = generator.torque_sign * speed
+            share = np.array([float(generator.velocity_factor(v)) for v in velocity])
+            grid[row][1].plot(speed, share, **look)
+        grid[row][0].set_xlim(*_ANGLES[joint])
+        flexion = "dorsiflexion" if joint == "ankle" else "flexion"
+        title = joint.capitalize()
+        dress(grid[row][0], title, f"{flexion} [deg]", "torque-angle factor [1]")
+        dress(grid[row][1], title, "shortening velocity\n[rad/s]", "torque-velocity factor [1]")
+    handles = [Line2D([], [], label=name, **_LOOK[name]) for name in _DIRECTIONS]  # type: ignore[arg-type]
+    legend(fig, handles)
+    return fig
+
+
+def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
+    """Return the muscle torques of both gaits at hip, knee and ankle of each side.
+
+    Extension and plantarflexion are positive; the torque of the orthoses is drawn thin.
+
+    Args:
+        barefoot: The gait without orthoses.
+        orthosis: The gait with orthoses.
+    """
+    fig = new_figure(4.2)
+    grid = fig.subplots(3, 2, sharex=True, sharey="row")
+    for column, side in enumerate(SIDES):
+        for ax, joint in zip(grid[:, column], LEG_JOINTS, strict=True):
+            dress(ax, f"{side.capitalize()} {joint}", y="" if column else _TORQUE)
+            zero_line(ax)
+            for series, look in ((barefoot, _BAREFOOT), (orthosis, _ORTHOSIS)):
+                for direction in _DIRECTIONS:
+                    name = f"{joint}_{direction}_{SUFFIX[side]}"
+                    torque = series.muscle_torque[:, GENERATORS.index(name)]
+                    _draw(ax, series, side, EXTENSION[joint] * torque, look)
+            if joint == "ankle":
+                own = orthosis.orthosis_torque[:, SIDES.index(side)]
+                _draw(ax, orthosis, side, own, {"color": NEUTRAL, "linewidth": 0.7})
+            percent_axis(ax, *([] if joint == LEG_JOINTS[-1] else [""]))
+    thin = Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis")
+    legend(fig, [*_gait_handles(), thin])
+    return fig
+
+
+def activation_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
+    """Return activations and excitations of both gaits for the muscles of each leg.
+
+    Args:
+        barefoot: The gait without orthoses.
+        orthosis: The gait with orthoses.
+    """
+    fig = new_figure(3.8)
+    grid = fig.subplots(3, 4, sharex=True, sharey=True)
+    columns = [(side, direction) for side in SIDES for direction in _DIRECTIONS]
+    for row, joint in zip(grid, LEG_JOINTS, strict=True):
+        for ax, (side, direction) in zip(row, columns, strict=True):
+            name = f"{joint}_{direction}_{SUFFIX[side]}"
+            column = GENERATORS.index(name)
+            dress(ax, f"{side.capitalize()} {joint}\n{direction}",
+                  y="activation [1]" if (side, direction) == columns[0] else "")  # fmt: skip
+            for series, look in ((barefoot, _BAREFOOT), (orthosis, _ORTHOSIS)):
+                thin = {**look, "linewidth": 0.6, "alpha": 0.7}
+                _draw(ax, series, side, series.excitation[:, column], thin)
+                _draw(ax, series, side, series.activation[:, column], look)
+            percent_axis(ax, "own cycle\n[%]" if joint == LEG_JOINTS[-1] else "")
+    grid[0][0].set_ylim(-0.03, 1.05)
+    thin_handle = Line2D([], [], color=NEUTRAL, linewidth=0.6, label="thin: excitation")
+    legend(fig, [*_gait_handles(), thin_handle])
+    return fig
+
+
+def _draw(
+    ax: Axes, series: GaitSeries, side: Side, values: np.ndarray, look: Mapping[str, object]
+) -> None:
+    """Draw a curve over the gait cycle of a side."""
+    cycle = own_cycle(series, side)
+    ax.plot(cycle.percent, values[cycle.index], **look)  # type: ignore[arg-type]
+
+
+def _gait_handles() -> Sequence[Line2D]:
+    """Return the legend entries of the two gaits."""
+    return [
+        Line2D([], [], label=label, **look)  # type: ignore[arg-type]
+        for label, look in (("MAPD-Barefoot", _BAREFOOT), ("MAPD-Orthosis", _ORTHOSIS))
+    ]

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import Final
+from typing import Any, Final
 
+from pathwalker_cli.conventions import COORDINATES, STIFFNESSES
 from pathwalker_cli.evaluation.evaluate import Change
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperClaim, PaperNumber
 from pathwalker_cli.reproduce.comparison import Row, all_rows
-from pathwalker_cli.reproduce.inverse_study import METHODS
-from pathwalker_cli.reproduce.problem_tables import optima_lines, problem_lines
-from pathwalker_cli.reproduce.results import Results
+from pathwalker_cli.reproduce.results import METHODS, ProblemResult, Results
 from pathwalker_cli.reproduce.words import (
+    degrees,
     deviation,
     label,
     ours_text,
@@ -110,27 +110,24 @@ def _plainly(rows: Iterable[Row]) -> list[str]:
 
 def _by_method(rows: Sequence[Row]) -> list[str]:
     """Return a table with the methods of inverse dynamics side by side."""
-    found: dict[PaperNumber, dict[str, Row]] = {}
+    grouped: dict[PaperNumber, dict[str, Row]] = {}
     for row in rows:
-        found.setdefault(row.number, {})[row.method] = row
+        grouped.setdefault(row.number, {})[row.method] = row
     head = ["quantity", "paper"]
     for method in METHODS:
         head += [f"ours, {method} method", "deviation"]
     cells = []
-    for number, by_method in found.items():
+    for number, by_method in grouped.items():
         line = [f"{subject(number)}: {label(number)}", printed(number)]
         for method in METHODS:
             own = by_method.get(method)
-            line += [_brief(own), deviation(own)] if own is not None else ["-", "-"]
+            line += ["-", "-"] if own is None else [
+                "*n. c.*" if isinstance(own.ours, str) else ours_text(own), deviation(own)
+            ]  # fmt: skip
         cells.append((*line, _why(next(iter(by_method.values())))))
     missing = {row.ours for row in rows if isinstance(row.ours, str)}
     notes = [f"*n. c.*, {each}.\n" for each in sorted(missing)]
     return notes + table((*head, "why"), cells)
-
-
-def _brief(row: Row) -> str:
-    """Return our number, or in short that there is none."""
-    return "*n. c.*" if isinstance(row.ours, str) else ours_text(row)
 
 
 def _why(row: Row) -> str:
@@ -165,7 +162,8 @@ def _change_lines(changes: Sequence[Change]) -> Iterator[str]:
         if change.paper is None:
             continue
         measure = change.measure
-        rises = _rises(change.paper)
+        paper = change.paper
+        rises = paper.rises if isinstance(paper, PaperClaim) else paper.value > 0.0
         moved = abs(change.value) > _UNCHANGED * abs(change.barefoot)
         same = ("yes" if (change.value > 0.0) == rises else "no") if moved else "no, unchanged"
         cells.append(
@@ -185,11 +183,6 @@ def _change_lines(changes: Sequence[Change]) -> Iterator[str]:
     yield from table(head, cells)
 
 
-def _rises(paper: PaperNumber | PaperClaim) -> bool:
-    """Return whether the article says that a quantity rises."""
-    return paper.rises if isinstance(paper, PaperClaim) else paper.value > 0.0
-
-
 def _figure_lines(figures: Sequence[tuple[str, str]]) -> Iterator[str]:
     """Yield the figures with their captions."""
     if not figures:
@@ -199,3 +192,114 @@ def _figure_lines(figures: Sequence[tuple[str, str]]) -> Iterator[str]:
         yield ""
         yield f"*{caption}*"
         yield ""
+
+
+Metrics = Mapping[str, Any]
+
+_SHAPING: Final = frozenset({*COORDINATES[2:], *STIFFNESSES, "duration", "walking_speed",
+                             "distance"})  # fmt: skip
+"""Bounds that are choices which shape a gait: joint range, duration, speed, springs."""
+
+
+def _pair(form: str, *keys: str) -> Callable[[Metrics], str]:
+    """Return what shows two metrics side by side."""
+    return lambda metrics: ", ".join(plain(metrics.get(key), form) for key in keys)
+
+
+def _sides(stem: str, form: str) -> Callable[[Metrics], str]:
+    """Return what shows a metric of the left and the right side."""
+    return _pair(form, f"{stem}_left", f"{stem}_right")
+
+
+def _knees(metrics: Metrics) -> str:
+    """Return the crouch measure left and right [deg]."""
+    return ", ".join(degrees(metrics[f"min_stance_knee_flexion_{s}"]) for s in ("left", "right"))
+
+
+_SOLVE: Final[dict[str, Callable[[Metrics], str]]] = {
+    "status": lambda m: str(m["status"]),
+    "cost": _pair(".4f", "cost"),
+    "iterations": _pair("d", "iterations"),
+    "seconds to build, to solve": _pair(".1f", "seconds_build", "seconds_solve"),
+    "mesh intervals": _pair("d", "intervals"),
+    "largest violation": _pair(".1e", "largest_violation"),
+    "re-integration error [rad or m]": _pair(".1e", "reintegration_position_error"),
+    "re-integration error [rad/s or m/s]": _pair(".1e", "reintegration_velocity_error"),
+}
+_GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
+    "walking speed [m/s]": _pair(".3f", "walking_speed"),
+    "step length left, right [m]": _sides("step_length", ".3f"),
+    "least knee flexion of stance left, right [deg]": _knees,
+    "effort per distance [s/m]": _pair(".4f", "effort_per_distance"),
+    "peak vertical force left, right [body weights]": _pair(
+        ".2f", "peak_vertical_force_left_body_weights", "peak_vertical_force_right_body_weights"
+    ),
+    "K_D left, right [N m/rad]": _sides("dorsiflexion_stiffness", ".1f"),
+    "K_P left, right [N m/rad]": _sides("plantarflexion_stiffness", ".1f"),
+}
+"""Rows of the table: what a solve says, and what its gait says if it converged."""
+
+
+def _shaping_bounds(result: ProblemResult) -> list[str]:
+    """Return the active bounds that are choices which shape the gait."""
+    return [str(bound) for bound in result.bounds if bound.name in _SHAPING]
+
+
+def problem_lines(results: Results) -> Iterator[str]:
+    """Yield the table of all problems and the list of their active bounds."""
+    problems = results.problems
+    rows = [("this call", *("kept" if each.kept else "solved now" for each in problems.values()))]
+    for name, show in _SOLVE.items():
+        rows.append((name, *(show(each.metrics) for each in problems.values())))
+    counts = (str(len(_shaping_bounds(p))) if p.converged else "-" for p in problems.values())
+    rows.append(("active bounds that shape the gait", *counts))
+    for name, show in _GAIT.items():
+        shown = (show(each.metrics) if each.converged else "-" for each in problems.values())
+        rows.append((name, *(text.replace("-, -", "-") for text in shown)))
+    yield from table(("", *problems), rows)
+    yield ""
+    yield "*kept*: solved by an earlier call with the same config; its times are those of then."
+    yield ""
+    yield "Active bounds that shape the gait:"
+    yield ""
+    for name, each in problems.items():
+        bounds = "; ".join(_shaping_bounds(each)) or "none"
+        yield f"- {name}: {bounds if each.converged else 'did not converge'}"
+
+
+def optima_lines(results: Results) -> Iterator[str]:
+    """Yield where the starts of every problem ended, best first."""
+    for name, each in results.problems.items():
+        optima = each.metrics.get("local_optima") or []
+        if not optima:
+            yield f"- {name}: one start ({each.metrics['start']})"
+    for each in results.problems.values():
+        if each.metrics.get("local_optima"):
+            yield from _optima(each)
+
+
+def _optima(result: ProblemResult) -> Iterator[str]:
+    """Yield the table of the local optima of one problem."""
+    optima = result.metrics["local_optima"]
+    best = optima[0]["cost"]
+    yield ""
+    yield f"{result.problem}, {len(optima)} starts:"
+    yield ""
+    rows = [
+        (str(each["start"]), each["status"], plain(each["cost"], ".4f"),
+         _above(each["cost"], best), plain(each["walking_speed"], ".3f"),
+         ", ".join(plain(k, ".1f") for k in each["stiffness"]) or "-",
+         str(each["iterations"]), plain(each["seconds"], ".0f"), each["description"])
+        for each in optima
+    ]  # fmt: skip
+    head = ("start", "status", "cost", "above the best", "speed [m/s]",
+            "K_D right, left, K_P right, left [N m/rad]", "iterations", "seconds",
+            "began with")  # fmt: skip
+    yield from table(head, rows)
+
+
+def _above(cost: float | None, best: float | None) -> str:
+    """Return by how much a cost lies above the best one."""
+    if cost is None or not best:
+        return "-"
+    return f"{100.0 * (cost - best) / abs(best):+.1f} %"

@@ -4,34 +4,63 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Final
 
-from pathwalker_cli.case import Case
+from pathwalker_cli.case import Case, load_case
+from pathwalker_cli.config import smoke_version
+from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.reproduce.figures import save_paper_figures
-from pathwalker_cli.reproduce.inverse_study import (
+from pathwalker_cli.reproduce.page import page_text
+from pathwalker_cli.reproduce.results import (
     METHODS,
     NO_C3D,
     InverseResult,
+    Results,
+    evaluated,
     inverse_config,
     inverse_result,
+    recordings,
 )
-from pathwalker_cli.reproduce.page import page_text
-from pathwalker_cli.reproduce.plan import check_folder, planned_studies
-from pathwalker_cli.reproduce.results import Results, evaluated, recordings
+from pathwalker_cli.results.run_folder import check_target
+from pathwalker_cli.studies.base import check_folder
 from pathwalker_cli.studies.run import done_run
 from pathwalker_cli.versions import versions
 
-__all__ = ["PAGE", "Say", "Solve", "reproduce"]
+__all__ = ["ENTRIES", "ORDER", "PAGE", "SEVERAL", "Solve", "planned_studies", "reproduce"]
 
-PAGE = "results.md"
+ORDER: Final = ("ls-barefoot", "mapd-barefoot", "mapd-orthosis", "mapd-ws-orthosis", "mapd-healthy")
+"""The problems in the order in which they are solved; each has a shipped config of its name."""
+
+SEVERAL: Final = ("mapd-barefoot", "mapd-orthosis")
+"""Problems whose optimum is sought from several starts: the article's main results."""
+
+PAGE: Final = "results.md"
 """File of the page."""
+
+ENTRIES: Final = frozenset({PAGE, "figures", "inverse-dynamics", "runs"})
+"""Everything that the folder holds; one with anything else is never written into."""
 
 Solve = Callable[[Case, Path], None]
 """Solves a study and writes its run folder, converged or not."""
 Say = Callable[[str], None]
 """Called with one line per step."""
+
+
+def planned_studies(starts: int, quick: bool) -> dict[str, Case]:
+    """Return the study of every problem, as shipped.
+
+    Args:
+        starts: Starts of the problems `SEVERAL`.
+        quick: Whether coarse meshes without refinement and one start will do.
+    """
+    cases = {problem: load_case(problem, problem) for problem in ORDER}
+    if quick:
+        return {p: replace(case, config=smoke_version(case.config)) for p, case in cases.items()}
+    return cases | {problem: cases[problem].with_values({"starts": starts}) for problem in SEVERAL}
 
 
 def reproduce(
@@ -43,7 +72,7 @@ def reproduce(
     Args:
         folder: Where everything goes.
         solve: Solves one study.
-        say: Told of every step with its seconds.
+        say: Called for every step, with its seconds.
         starts: Starts of the article's main problems.
         quick: Whether coarse meshes without refinement and one start will do.
         c3d: Folder of the article's C3D files, for the published method of inverse dynamics.
@@ -51,7 +80,7 @@ def reproduce(
     Raises:
         InputError: If the folder holds something else, or an input cannot be used.
     """
-    check_folder(folder)
+    _check(folder)
     studies = planned_studies(starts, quick)
     inverse = _inverse(folder / "inverse-dynamics", c3d, say)
     kept = _solved(folder / "runs", studies, solve, say)
@@ -68,20 +97,29 @@ def reproduce(
     return results
 
 
+def _check(folder: Path) -> None:
+    """Refuse a folder that cannot take the results, before anything is computed."""
+    check_folder(folder, ENTRIES, "reproduce")
+    for place in (folder / name for name in ENTRIES - {PAGE}):
+        if place.exists() and not place.is_dir():
+            raise DataError("is a file, not a folder", where=str(place), mend="remove it")
+    for problem in ORDER:
+        check_target(folder / "runs" / problem)
+
+
 def _inverse(folder: Path, c3d: Path | None, say: Say) -> dict[str, InverseResult | str]:
     """Return the inverse dynamics study by method."""
-    found: dict[str, InverseResult | str] = {}
+    results: dict[str, InverseResult | str] = {}
     for method in METHODS:
-        began = time.perf_counter()
+        began, state = time.perf_counter(), "left out, no --c3d"
         config = inverse_config(method, c3d)
-        name = f"inverse dynamics, {method}"
         if config is None:
-            found[method] = NO_C3D
-            say(_line(name, "left out, no --c3d", began))
-            continue
-        found[method], kept = inverse_result(config, folder / f"{method}.json", lambda _: None)
-        say(_line(name, "was there" if kept else "done", began))
-    return found
+            results[method] = NO_C3D
+        else:
+            results[method], kept = inverse_result(config, folder / f"{method}.json")
+            state = "was there" if kept else "done"
+        say(_line(f"inverse dynamics, {method}", state, began))
+    return results
 
 
 def _solved(folder: Path, studies: Mapping[str, Case], solve: Solve, say: Say) -> dict[str, bool]:

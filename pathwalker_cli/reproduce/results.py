@@ -1,26 +1,133 @@
-"""What the page of results is made from."""
+"""What the page of results is made from: solved problems, inverse dynamics, recordings."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from pathwalker_cli import __version__
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.paper import PATIENT
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
+from pathwalker_cli.inverse.evaluate import dynamics_trials
+from pathwalker_cli.inverse.study import InverseDynamicsConfig, load_inverse_dynamics
+from pathwalker_cli.inverse.study_tables import residual_tables, strength_table
+from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.violations import ActiveBound
-from pathwalker_cli.patient import load_patient
-from pathwalker_cli.reproduce.inverse_study import InverseResult
+from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import stride_of
 
-__all__ = ["ProblemResult", "Results", "evaluated", "recordings"]
+__all__ = [
+    "METHODS",
+    "NO_C3D",
+    "InverseResult",
+    "ProblemResult",
+    "Results",
+    "evaluated",
+    "inverse_config",
+    "inverse_result",
+    "recordings",
+]
+
+METHODS: Final = ("default", "published")
+"""Methods of inverse dynamics, ours and the article's."""
+
+NO_C3D: Final = "not computed: the published method needs the article's C3D files (--c3d)"
+"""Why there is no result of the published method."""
+
+_PARTS: Final = ("forward", "up", "moment")
+
+
+@dataclass(frozen=True)
+class InverseResult:
+    """Strengths and residuals by one method.
+
+    Args:
+        method: "default" or "published".
+        body_mass: Mass by which residuals are divided [kg].
+        strengths: Maximum isometric torque by generator [N m].
+        residuals: By "<condition>_<forward|up|moment>_<mean|min|max>", means of trials over whole
+            gait cycles, per body mass [N/kg, N m/kg].
+        remarks: By generator, what makes its strength uncertain.
+    """
+
+    method: str
+    body_mass: float
+    strengths: Mapping[str, float]
+    residuals: Mapping[str, float]
+    remarks: Mapping[str, str]
+
+
+def inverse_config(method: str, c3d: Path | None) -> InverseDynamicsConfig | None:
+    """Return the shipped study with a method, None if it lacks the C3D files.
+
+    Args:
+        method: A member of `METHODS`.
+        c3d: Folder with the folders barefoot and orthosis of the article's C3D files, or None.
+    """
+    if method == "default":
+        return load_inverse_dynamics("inverse-dynamics")
+    if c3d is None:
+        return None
+    folders = (f"c3d.{name}=[{json.dumps(str(c3d / name))}]" for name in ("barefoot", "orthosis"))
+    return load_inverse_dynamics("inverse-dynamics", ("source=c3d", "method=published", *folders))
+
+
+def inverse_result(config: InverseDynamicsConfig, file: Path) -> tuple[InverseResult, bool]:
+    """Return strengths and residuals, and whether they were read from the file of an earlier run.
+
+    Args:
+        config: The study.
+        file: Where the result is kept; written if it was not there or belongs to something else.
+    """
+    patient = load_patient(config.patient)
+    key = _key(config, patient)
+    kept = _read(file, key)
+    if kept is not None:
+        return kept, True
+    trials = dynamics_trials(config, patient, lambda _: None)
+    residuals = {
+        f"{table.condition}_{part}_{kind}": float(value)
+        for table in residual_tables(trials, patient, config)
+        if table.part == "whole cycle" and (span := table.range) is not None
+        for kind, values in (("mean", span.mean), ("min", span.lowest), ("max", span.highest))
+        for part, value in zip(_PARTS, values / table.body_mass, strict=True)
+    }
+    rows = strength_table(trials, patient, config).rows
+    result = InverseResult(
+        method=config.method,
+        body_mass=float(patient.body_mass),
+        strengths={row.generator: float(row.value) for row in rows},
+        residuals=residuals,
+        remarks={row.generator: row.remark for row in rows},
+    )
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_json(file, {"made_from": key, **asdict(result)})
+    return result, False
+
+
+def _key(config: InverseDynamicsConfig, patient: Patient) -> dict[str, Any]:
+    """Return what a result depends on."""
+    text = patient.source.read_text(encoding="utf-8") if patient.source is not None else ""
+    return {"config": config.model_dump(mode="json"), "patient": text, "version": __version__}
+
+
+def _read(file: Path, key: dict[str, Any]) -> InverseResult | None:
+    """Return an earlier result that was made from the same, or None."""
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        made_from = content.pop("made_from")
+        return InverseResult(**content) if made_from == key else None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
 
 
 @dataclass(frozen=True)
@@ -84,12 +191,11 @@ class Results:
 def recordings() -> dict[Condition, RecordedGait]:
     """Return the recordings of the article's patient by condition."""
     patient = load_patient(PATIENT)
-    found: dict[Condition, RecordedGait] = {}
-    for condition in CONDITIONS:
-        gait = recorded_gait(build_walker(patient, condition))
-        if gait is not None:
-            found[condition] = gait
-    return found
+    return {
+        condition: gait
+        for condition in CONDITIONS
+        if (gait := recorded_gait(build_walker(patient, condition))) is not None
+    }
 
 
 def evaluated(

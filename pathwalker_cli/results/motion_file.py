@@ -15,7 +15,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.costs import Costs
-from pathwalker_cli.io.special import refuse_special
+from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion

@@ -20,7 +20,7 @@ from pathwalker_cli.conventions import (
     velocity_unit,
 )
 from pathwalker_cli.io.atomic import atomic_path
-from pathwalker_cli.io.table import write_table
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.trajectory_csv import write_trajectory
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import centre_of_pressure

@@ -7,21 +7,24 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 from jinja2 import Environment
 from pydantic import BaseModel
 
-from pathwalker_cli.io.described import described, field_at
+from pathwalker_cli.conventions import CONDITIONS
+from pathwalker_cli.errors import DataError, PatientError
+from pathwalker_cli.inverse.recorded_files import staged_folder
+from pathwalker_cli.io.fields import described, field_at
 from pathwalker_cli.io.templates import templates
-from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.blocks import OrthosisData
 from pathwalker_cli.patient.proportions import ANKLE_HEIGHT, HEEL_SHARE, TOE_SHARE, default_length
 from pathwalker_cli.starter.child import Child
-from pathwalker_cli.starter.comments import WIDTH, comment, commented, unbroken
-from pathwalker_cli.starter.configs import config_files
+from pathwalker_cli.starter.configs import WIDTH, comment, commented, config_files, unbroken
 
-__all__ = ["EXAMPLE_NOTE", "Step", "command_lines", "explained_keys", "folder_files", "next_steps"]
+__all__ = ["command_lines", "explained_keys", "folder_files", "next_steps", "write_folder"]
 
 _LENGTHS: Final = {
     "pelvis": "Length of the pelvis segment.",
@@ -60,26 +63,26 @@ class Step:
     commands: tuple[str, ...] = ()
 
 
-def folder_files(child: Child, worn: bool, example: bool) -> dict[str, str]:
+def folder_files(child: Child, with_orthosis: bool, example: bool) -> dict[str, str]:
     """Return the texts of a new folder by file name.
 
     Args:
         child: The child.
-        worn: Whether there is an orthosis.
+        with_orthosis: Whether there is an orthosis.
         example: Whether recordings come with it.
     """
-    files = {"patient.yaml": _patient(child, worn, {})}
+    files = {"patient.yaml": _patient(child, with_orthosis, {})}
     purposes = {"patient.yaml": "the child: begin here"}
-    if worn:
+    if with_orthosis:
         files["orthosis.yaml"] = _orthosis({})
         purposes["orthosis.yaml"] = "the orthosis and its springs"
-    for file in config_files(worn):
+    for file in config_files(with_orthosis):
         files[file.name] = _environment().get_template("config.yaml.j2").render(file=file)
         purposes[file.name] = file.purpose[0].lower() + file.purpose[1:].split(". ")[0].rstrip(".")
     if example:
         purposes["c3d/"] = "made recordings"
     readme = _environment().get_template("README.txt.j2")
-    steps = next_steps(worn, example)
+    steps = next_steps(with_orthosis, example)
     shown = {
         name: textwrap.fill(text, WIDTH - 26).replace("\n", "\n" + " " * 26)
         for name, text in purposes.items()
@@ -90,14 +93,14 @@ def folder_files(child: Child, worn: bool, example: bool) -> dict[str, str]:
     return files
 
 
-def next_steps(worn: bool, example: bool) -> tuple[Step, ...]:
+def next_steps(with_orthosis: bool, example: bool) -> tuple[Step, ...]:
     """Return what to do with a new folder, one command after the other.
 
     Args:
-        worn: Whether there is an orthosis.
+        with_orthosis: Whether there is an orthosis.
         example: Whether recordings come with it.
     """
-    conditions = ("barefoot", "orthosis") if worn else ("barefoot",)
+    conditions = ("barefoot", "orthosis") if with_orthosis else ("barefoot",)
     problems = [f"mapd-{condition}" for condition in conditions]
     imports = tuple(
         f"pathwalker import c3d/{c} --patient . --condition {c} -o recordings/{c}"
@@ -111,10 +114,10 @@ def next_steps(worn: bool, example: bool) -> tuple[Step, ...]:
             ("pathwalker id inverse-dynamics.yaml --update-patient",),
         ),
     )
-    fill_in = "Fill in patient.yaml" + (" and orthosis.yaml." if worn else ".")
+    fill_in = "Fill in patient.yaml" + (" and orthosis.yaml." if with_orthosis else ".")
     if not example:
         c3d = "With C3D recordings: put them into c3d/barefoot"
-        c3d += " and c3d/orthosis" if worn else ""
+        c3d += " and c3d/orthosis" if with_orthosis else ""
         recorded = _begun(recorded, f"{c3d}. Without any, go on with step 5.")
     check = f"pathwalker check patient.yaml {' '.join(f'{name}.yaml' for name in problems)}"
     solves = tuple(f"pathwalker solve {n} {n}.yaml --out runs/{n}" for n in problems)
@@ -124,7 +127,7 @@ def next_steps(worn: bool, example: bool) -> tuple[Step, ...]:
             f"pathwalker perturb perturbation.yaml --run runs/{last}",
             f"pathwalker sensitivity sensitivity.yaml --run runs/{last}",
         ))
-        if worn
+        if with_orthosis
         else Step("Ask which number of the child matters most.", (
             f"pathwalker sensitivity sensitivity.yaml --run runs/{last}",
         ))
@@ -133,7 +136,7 @@ def next_steps(worn: bool, example: bool) -> tuple[Step, ...]:
         *(() if example else (Step(fill_in),)),
         *recorded,
         Step("See what would be solved, and whether all fits together.", (check,)),
-        Step("Predict the gait" + (" and identify the springs." if worn else "."), solves),
+        Step("Predict the gait" + (" and identify the springs." if with_orthosis else "."), solves),
         study,
     )
 
@@ -161,7 +164,7 @@ def explained_keys() -> dict[str, dict[str, str]]:
     return {"patient": patient, "orthosis": orthosis}
 
 
-def _patient(child: Child, worn: bool, told: dict[str, str]) -> str:
+def _patient(child: Child, with_orthosis: bool, explained: dict[str, str]) -> str:
     """Return the text of the patient's file; take note of what is said of each key."""
     lengths = ("thigh", "shank", "foot")
     foot = child.length("foot")
@@ -172,9 +175,9 @@ def _patient(child: Child, worn: bool, told: dict[str, str]) -> str:
 
     return _environment().get_template("patient.yaml.j2").render(
         child=child,
-        worn=worn,
+        with_orthosis=with_orthosis,
         lengths=_LENGTHS,
-        entry=partial(_entry, Patient, told),
+        entry=partial(_entry, Patient, explained),
         num=lambda value: f"{value:g}",
         sides=lambda name: _sides((child.length(name),) * 2) if name in lengths else "",
         length=lambda name: f"{default_length(name, child.height):g}",
@@ -184,15 +187,15 @@ def _patient(child: Child, worn: bool, told: dict[str, str]) -> str:
     )  # fmt: skip
 
 
-def _orthosis(told: dict[str, str]) -> str:
+def _orthosis(explained: dict[str, str]) -> str:
     """Return the text of the orthosis' file; take note of what is said of each key."""
     template = _environment().get_template("orthosis.yaml.j2")
-    return template.render(entry=partial(_entry, OrthosisData, told))
+    return template.render(entry=partial(_entry, OrthosisData, explained))
 
 
 def _entry(
     model: type[BaseModel],
-    told: dict[str, str],
+    explained: dict[str, str],
     place: str,
     value: str,
     text: str,
@@ -200,7 +203,7 @@ def _entry(
     kind: bool = True,
 ) -> str:
     """Return a key with its value, below what it is, its unit and its range."""
-    told[place] = text
+    explained[place] = text
     field = field_at(model, place)
     known = _unit_and_range(*described(field.annotation, list(field.metadata))) if kind else ""
     depth, name = place.count("."), place.rpartition(".")[2]
@@ -209,8 +212,8 @@ def _entry(
 
 def _unit_and_range(kind: str, allowed: str) -> str:
     """Return unit and range of a key, e.g. "[kg], 5 to 150", as a text that does not wrap."""
-    found = re.match(r"(?:number|\[lower, upper\]), (?P<unit>[^;]+?)(?:;| or null|$)", kind)
-    unit = f"[{found['unit']}]" if found else ""
+    unit_in = re.match(r"(?:number|\[lower, upper\]), (?P<unit>[^;]+?)(?:;| or null|$)", kind)
+    unit = f"[{unit_in['unit']}]" if unit_in else ""
     return unbroken(", ".join(filter(None, [unit, allowed.replace("`", "")])))
 
 
@@ -236,3 +239,49 @@ def _environment() -> Environment:
         "column": lambda name: f"{name:<26}",
     }
     return environment
+
+
+def check_new(folder: Path) -> None:
+    """Refuse a folder that holds anything.
+
+    Raises:
+        DataError: If it does, or is a file.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise DataError("is a file, not a folder", where=str(folder), mend="choose another name")
+    inside = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    if inside:
+        raise DataError(
+            f"is not empty: it holds {inside[0]}",
+            where=str(folder),
+            allowed="a new or empty folder",
+            mend="choose another name",
+        )
+
+
+def write_folder(folder: Path, child: Child, with_orthosis: bool, example: bool) -> None:
+    """Write a new folder for a child.
+
+    Args:
+        folder: The folder; new or empty.
+        child: The made-up child to begin with.
+        with_orthosis: Whether there is an orthosis.
+        example: Whether to make C3D files of the child.
+
+    Raises:
+        DataError: If the folder is not empty or cannot be written.
+        PatientError: If no child of these numbers is accepted.
+    """
+    check_new(folder)
+    with staged_folder(folder) as staging:
+        for name, text in folder_files(child, with_orthosis, example).items():
+            (staging / name).write_text(text, encoding="utf-8")
+        try:
+            patient = load_patient(staging)
+        except PatientError as error:
+            where = f"--{error.where.rpartition(' ')[2].replace('body_', '')}"
+            raise PatientError(error.what, where=where, allowed=error.allowed) from None
+        if example:
+            from pathwalker_cli.starter.example import write_example
+
+            write_example(staging, patient, CONDITIONS if with_orthosis else ("barefoot",))

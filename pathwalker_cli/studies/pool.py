@@ -9,7 +9,7 @@ from typing import Final
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.io.processes import called_elsewhere, prepare_worker
+from pathwalker_cli.io.processes import results_of_calls
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import resolver_of
 from pathwalker_cli.studies.journal import STOPPED, Journal
@@ -109,22 +109,17 @@ def _solved_here(jobs: Sequence[Job], origin: _Origin, workers: int) -> Iterator
 
 def _solved_elsewhere(jobs: Sequence[Job], origin: _Origin, workers: int) -> Iterator[Solved]:
     """Yield what other processes solve."""
-    calls = [(job,) for job in jobs]
     try:
-        yield from called_elsewhere(_in_worker, calls, workers, _begin, (origin,))
+        yield from results_of_calls(_in_worker, [(origin, job) for job in jobs], workers)
     except KeyboardInterrupt:
         raise NotConvergedError(STOPPED) from None
 
 
-_KEPT: Final[list[Journal]] = []
-"""The journal of a worker process, built once."""
+_JOURNALS: Final[dict[Path, Journal]] = {}
+"""The journal of a worker process by its folder, built once."""
 
 
-def _begin(origin: _Origin) -> None:
-    """Get a worker process ready."""
-    prepare_worker()
-    _KEPT[:] = [_journal(origin)]
-
-
-def _in_worker(job: Job) -> Solved:
-    return _solved(_KEPT[0], job)
+def _in_worker(origin: _Origin, job: Job) -> Solved:
+    if origin[1] not in _JOURNALS:
+        _JOURNALS[origin[1]] = _journal(origin)
+    return _solved(_JOURNALS[origin[1]], job)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -14,7 +14,7 @@ import numpy as np
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.cost_terms import cost_terms, goal_values
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.io.special import refuse_special
+from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -149,43 +149,34 @@ def _same_table(path: Path, expected: Path) -> Check:
     if not path.is_file():
         raise DataError("is missing", where=str(path), mend="solve again")
     try:
-        found = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+        cells = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
     except (OSError, UnicodeDecodeError):
         raise DataError("is damaged", where=str(path), mend="solve again") from None
     wanted = [line.split(",") for line in expected.read_text(encoding="utf-8").splitlines()]
-    if [len(row) for row in found] != [len(row) for row in wanted] or found[:1] != wanted[:1]:
+    if [len(row) for row in cells] != [len(row) for row in wanted] or cells[:1] != wanted[:1]:
         return Check(path.name, math.inf, _SAME, "relative", "has other rows or columns")
-    worst, place = 0.0, ""
-    scale = _column_scales(wanted)
-    for i, (mine, other) in enumerate(zip(found[1:], wanted[1:], strict=True), start=2):
-        for j, (one, two) in enumerate(zip(mine, other, strict=True)):
-            difference = 0.0 if one == two else _difference(one, two, scale[j])
-            if difference > worst:
-                worst, place = difference, f"line {i}, {wanted[0][j]}"
-    return Check(path.name, worst, _SAME, "relative", f"in {place}" if place else "")
+    columns = [[abs(_float(cell)) for cell in column] for column in zip(*wanted[1:], strict=True)]
+    scales = [max(filter(math.isfinite, column), default=0.0) or 1.0 for column in columns]
+    return _largest(path.name, (
+        (f"line {i}, {heading}", 0.0 if one == two else abs(_float(one) - _float(two)) / scale)
+        for i, rows in enumerate(zip(cells[1:], wanted[1:], strict=True), start=2)
+        for one, two, heading, scale in zip(*rows, wanted[0], scales, strict=True)
+    ))  # fmt: skip
 
 
-def _column_scales(rows: list[list[str]]) -> list[float]:
-    """Return the largest amount in every column; 1 where there is none."""
-    columns = zip(*rows[1:], strict=True)
-    return [max((abs(_number(cell)) for cell in column), default=0.0) or 1.0 for column in columns]
-
-
-def _number(cell: str) -> float:
+def _float(cell: str) -> float:
+    """Return the number in a cell, NaN for anything else."""
     try:
-        value = float(cell)
+        return float(cell)
     except ValueError:
-        return 0.0
-    return value if math.isfinite(value) else 0.0
+        return math.nan
 
 
-def _difference(one: str, two: str, scale: float) -> float:
-    """Return the difference of two cells by the scale of their column; infinite if not numbers."""
-    try:
-        difference = abs(float(one) - float(two)) / scale
-    except ValueError:
-        return math.inf
-    return difference if math.isfinite(difference) else math.inf
+def _largest(name: str, differences: Iterable[tuple[str, float]]) -> Check:
+    """Return the largest of relative differences by place; NaN counts as infinite."""
+    known = ((place, d if math.isfinite(d) else math.inf) for place, d in differences)
+    place, worst = max(known, key=lambda pair: pair[1], default=("", 0.0))
+    return Check(name, worst, _SAME, "relative", f"in {place}" if worst else "")
 
 
 def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[Check]:
@@ -197,12 +188,8 @@ def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
         made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)
-    worst, place = 0.0, ""
-    for key, value in _flat(made):
-        difference = _apart(_at(metrics, key), value)
-        if difference > worst:
-            worst, place = difference, ".".join(key)
-    yield Check("metrics.json", worst, _SAME, "relative", f"in {place}" if place else "")
+    pairs = ((".".join(key), _apart(_at(metrics, key), value)) for key, value in _flat(made))
+    yield _largest("metrics.json", pairs)
 
 
 def _flat(content: Any, key: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
@@ -258,12 +245,12 @@ def _dynamics(run: Run, series: GaitSeries, numbers: dict[str, Any]) -> Iterator
         ("velocity", errors.worst_velocity, mesh.velocity_tolerance, "rad/s or m/s"),
     ):
         yield Check(f"re-integrated {name}", error if refined else None, limit, unit, note)
-    found = balance(series)
+    balances = balance(series)
     shares = (
-        ("work against energy", found.energy / found.work_scale, _ENERGY),
-        ("work of the ground", found.contact_work / found.work_scale, _ENERGY),
-        ("impulse against momentum", found.impulse / found.impulse_scale, _MOMENTUM),
-        ("angular impulse", found.angular_impulse / found.angular_scale, _MOMENTUM),
+        ("work against energy", balances.energy / balances.work_scale, _ENERGY),
+        ("work of the ground", balances.contact_work / balances.work_scale, _ENERGY),
+        ("impulse against momentum", balances.impulse / balances.impulse_scale, _MOMENTUM),
+        ("angular impulse", balances.angular_impulse / balances.angular_scale, _MOMENTUM),
     )
     for name, share, limit in shares:
         yield Check(name, share if refined else None, limit, "share", note)
@@ -287,12 +274,12 @@ def _solution(run: Run, solver: GaitSolver) -> Iterator[Check]:
     ):
         yield Check("optimality", math.inf, 0.0, "", "multipliers of another program")
         return
-    found, tolerances = optimality(program, unknowns, run.multipliers), run.config.solver
+    conditions, tolerances = optimality(program, unknowns, run.multipliers), run.config.solver
     tolerance = _SLACK * tolerances.tolerance
     # rounding of a motion that is written and read
     met = _SLACK * tolerances.constraint_tolerance
     scale = max(1.0, float(np.abs(unknowns).max()))
-    yield Check("rows and bounds", found.infeasibility / scale, met, "solver units")
-    yield Check("stationarity", found.stationarity, tolerance, "solver units")
-    yield Check("complementarity", found.complementarity, tolerance, "solver units")
-    yield Check("signs of multipliers", found.wrong_sign, tolerance, "solver units")
+    yield Check("rows and bounds", conditions.infeasibility / scale, met, "solver units")
+    yield Check("stationarity", conditions.stationarity, tolerance, "solver units")
+    yield Check("complementarity", conditions.complementarity, tolerance, "solver units")
+    yield Check("signs of multipliers", conditions.wrong_sign, tolerance, "solver units")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
-from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.csv_file import read_rows
 from pathwalker_cli.studies.batch.ledger import CASES, TABLE
 from pathwalker_cli.studies.batch.table import numbers_of, read_metrics
 from pathwalker_cli.verification.checks import Check, Verification
@@ -35,11 +34,7 @@ def verify_table(folder: Path) -> Verification | None:
     path = folder / TABLE
     if not path.is_file():
         return None
-    try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file, strict=True, restval=""))
-    except (OSError, ValueError, csv.Error) as problem:
-        raise DataError(f"cannot be read: {problem}", where=str(path)) from None
+    rows = read_rows(path, ())
     runs = {run.name: run for run in _entries(folder / CASES)}
     wrong = [f"{row.get('case')}" for row in rows if not _as_run(row, runs)]
     note = f"{', '.join(wrong[:3])} not as in its metrics.json" if wrong else ""
@@ -47,16 +42,15 @@ def verify_table(folder: Path) -> Verification | None:
     return Verification(folder, f"table of {len(rows)} cases", "", (check,))
 
 
-def _as_run(row: Mapping[str | None, str], runs: Mapping[str, Path]) -> bool:
+def _as_run(row: Mapping[str, str], runs: Mapping[str, Path]) -> bool:
     """Return whether a row says what the run of its case says; a case without a run has none."""
-    cells = {str(name).partition(" [")[0]: cell for name, cell in row.items()}
-    status, run = cells.get("status", ""), runs.get(cells.get("case", ""))
+    status, run = row.get("status", ""), runs.get(row.get("case", ""))
     metrics = None if run is None else read_metrics(run)
     if metrics is not None and metrics["status"] != status:
         return False
     if metrics is None and status == "converged":
         return False
-    return all(cells.get(name) == text for name, text in numbers_of(status, metrics).items())
+    return all(row.get(name) == text for name, text in numbers_of(status, metrics).items())
 
 
 def _status(run: Path) -> str:

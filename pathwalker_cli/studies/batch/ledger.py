@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pathwalker_cli.io.table import write_table
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.csv_file import read_cells, write_table
 from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.table import (
     CONVERGED,
@@ -145,9 +145,8 @@ def _awaited_metrics(folder: Path) -> dict[str, Any] | None:
 def _read_times(path: Path) -> dict[str, tuple[str, ...]]:
     """Return the rows of an earlier table of times by case; none if it cannot be read."""
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.reader(file))[1:]
-    except (OSError, ValueError, csv.Error):
+        rows = read_cells(path)[1:]
+    except DataError:
         return {}
     return {row[0]: tuple(row) for row in rows if len(row) == len(_TIMES_HEADER)}
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import signal
-from collections import deque
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
 from typing import Final
 
-from pebble import ProcessExpired, ProcessPool
+from pebble import ProcessExpired
 
-from pathwalker_cli.io.processes import deaf, prepare_worker
+from pathwalker_cli.io.processes import ended_calls
 from pathwalker_cli.nlp.machine import use_one_blas_thread
 from pathwalker_cli.studies.batch.worker import LOST, Result, Task, Work, failure
 
@@ -21,9 +20,6 @@ __all__ = ["LocalPool"]
 ATTEMPTS: Final = 2
 """How often a case is tried whose worker dies: once more when the others are done, when there is
 more memory for it."""
-
-GLANCE: Final = 1.0
-"""Time after which it is noticed that no worker can begin at all [s]."""
 
 NO_WORKERS: Final = "the workers died before they could begin; did memory run out?"
 
@@ -51,43 +47,17 @@ class LocalPool:
         waiting = list(tasks)
         for _ in range(ATTEMPTS):
             lost.clear()
-            if waiting:
-                yield from self._round(waiting, work, lost)
+            calls = [(task.case, task.folder, task.warm_start) for task in waiting]
+            with closing(ended_calls(work, calls, self._count, self._time_limit)) as ended:
+                for number, future in ended:
+                    name = waiting[number].name
+                    try:
+                        yield name, self._result(future)
+                    except (ProcessExpired, BrokenProcessPool) as death:
+                        lost[name] = _death(death)
             waiting = [task for task in waiting if task.name in lost]
         for name, detail in lost.items():
             yield name, failure(LOST, detail)
-
-    def _round(
-        self, tasks: Sequence[Task], work: Work, lost: dict[str, str]
-    ) -> Iterator[tuple[str, Result]]:
-        """Try every task once; note the ones whose worker died in `lost`, with the reason."""
-        waiting, running = deque(tasks), dict[Future[Result], str]()
-        count = min(self._count, len(tasks))
-        context = multiprocessing.get_context("spawn")
-        pool = ProcessPool(max_workers=count, initializer=prepare_worker, context=context)
-        try:
-            while (waiting or running) and pool.active:
-                while waiting and len(running) < count:
-                    task = waiting.popleft()
-                    running[self._submit(pool, task, work)] = task.name
-                for future in wait(running, GLANCE, FIRST_COMPLETED).done:
-                    name = running.pop(future)
-                    try:
-                        result = self._result(future)
-                    except (ProcessExpired, BrokenProcessPool) as death:
-                        lost[name] = _death(death)
-                    else:
-                        yield name, result
-        finally:
-            with deaf():  # within the pool it could leave a lock held, and the pool never end
-                pool.stop()
-                pool.join()
-        lost |= dict.fromkeys([*running.values(), *(task.name for task in waiting)], NO_WORKERS)
-
-    def _submit(self, pool: ProcessPool, task: Task, work: Work) -> Future[Result]:
-        arguments = (task.case, task.folder, task.warm_start)
-        with deaf():
-            return pool.schedule(work, args=arguments, timeout=self._time_limit)
 
     def _result(self, future: Future[Result]) -> Result:
         """Return what a worker handed back.

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.io.table import write_table
 from pathwalker_cli.results.text import spring_ends
 from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.measures import COMPARED

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.io.table import write_table
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.tradeoff.figures import save_tradeoff_figure
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff

@@ -9,8 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.io.table import write_table
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.studies.pool import Solved
 from pathwalker_cli.studies.springs import free_springs

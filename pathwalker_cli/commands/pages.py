@@ -1,4 +1,4 @@
-"""The command `animate`: the walker of one or two runs, moving, as a file."""
+"""The command `report`: one page instead of many files."""
 
 from __future__ import annotations
 
@@ -7,23 +7,38 @@ from pathlib import Path
 
 import click
 
-from pathwalker_cli.commands.complete import runs_argument
+from pathwalker_cli.commands.complete import complete_runs
+from pathwalker_cli.commands.options import out_option, runs_argument
 
-__all__ = ["animate_command"]
+
+@click.command("report")
+@runs_argument()
+@out_option("The page; an earlier one is replaced.", "-o", required=True, metavar="FILE.html")
+def report_command(runs: tuple[Path, ...], out: Path) -> None:
+    """Write one self-contained HTML page about RUN folders, to be read or printed.
+
+    Runs of one patient, barefoot and with orthoses, stand side by side; folders of perturb,
+    sensitivity and landscape among RUN, inside or beside a run add their tables. Folders that id
+    or batch wrote give a page of their own, of any number of patients. A run that did not converge
+    is refused, except in a cohort, where it is shown as failed.
+    """
+    from pathwalker_cli.errors import DataError
+    from pathwalker_cli.io.atomic import check_output, write_text
+    from pathwalker_cli.report.html import page_html, page_of
+
+    if out.suffix not in (".html", ".htm"):
+        raise DataError("is no name of a page", where=f"--out {out}", allowed="FILE.html")
+    check_output(out)
+    write_text(out, page_html(page_of(runs)))
+    click.echo(f"Written to {out}")
+
 
 _PAGE, _FILMS = ".html", (".gif", ".mp4")
 
 
 @click.command("animate")
 @runs_argument("RUN [RUN]")
-@click.option(
-    "-o",
-    "--out",
-    required=True,
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="File: .html, .gif or .mp4.",
-)
+@out_option("File: .html, .gif or .mp4.", "-o", required=True, metavar="FILE")
 @click.option(
     "--strides", type=click.IntRange(1, 100), metavar="N", help="Strides of a film; 1 if left out."
 )
@@ -85,11 +100,9 @@ def _page(runs: tuple[Path, ...], out: Path) -> None:
     """Write a page."""
     from pathwalker_cli.animation.frames import run_frames
     from pathwalker_cli.animation.html import RATE, html_page
-    from pathwalker_cli.io.atomic import output_path
+    from pathwalker_cli.io.atomic import write_text
 
-    page = html_page(run_frames(runs, RATE))
-    with output_path(out) as file:
-        file.write_text(page, encoding="utf-8", newline="")
+    write_text(out, html_page(run_frames(runs, RATE)))
 
 
 def _film(runs: tuple[Path, ...], out: Path, strides: int, fps: float, slow: float) -> None:
@@ -100,3 +113,32 @@ def _film(runs: tuple[Path, ...], out: Path, strides: int, fps: float, slow: flo
     rate = film_rate(out, fps)
     frames = run_frames(runs, rate * slow)
     write_film(out, frames, strides, rate)
+
+
+@click.command("view")
+@click.argument("run", metavar="RUN", type=click.Path(path_type=Path), shell_complete=complete_runs)
+@click.option(
+    "--strides",
+    type=click.IntRange(1, 1000),
+    metavar="N",
+    help="Strides to play; until Ctrl-C if left out.",
+)
+@click.option("--no-open", is_flag=True, help="Print the address only, open no browser.")
+def view_command(run: Path, strides: int | None, no_open: bool) -> None:
+    """Show the stride of RUN in 3D in a browser, in real time, until Ctrl-C.
+
+    The walker moves on the spot, as on a treadmill. Needs MeshCat: pip install meshcat. A run that
+    did not converge is refused.
+    """
+    from pathwalker_cli.animation.viewer import open_viewer, show
+    from pathwalker_cli.evaluation.run import stride_of_run
+
+    _, series = stride_of_run(run)
+    viewer = open_viewer(series.walker)
+    click.echo(f"{run} at {viewer.viewer.url()}; Ctrl-C ends it")
+    if not no_open:
+        viewer.viewer.open()
+    try:
+        show(viewer, series, strides)
+    except KeyboardInterrupt:
+        click.echo()

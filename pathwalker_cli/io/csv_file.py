@@ -1,0 +1,73 @@
+"""CSV tables: numbers out with nine significant digits, cells back as text by column."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.atomic import atomic_open
+
+__all__ = ["number", "read_cells", "read_rows", "write_table"]
+
+
+def write_table(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a table in one stroke; None becomes an empty cell."""
+    with atomic_open(path) as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        for row in rows:
+            writer.writerow([f"{v:.9g}" if isinstance(v, float) else v for v in row])
+
+
+def read_cells(path: Path, mend: str = "") -> list[list[str]]:
+    """Return the rows of a file that are not empty, its header among them.
+
+    Raises:
+        DataError: If it cannot be read.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            return [row for row in csv.reader(file) if row]
+    except FileNotFoundError:
+        raise DataError("no such file", where=str(path), mend=mend) from None
+    except (OSError, UnicodeDecodeError, csv.Error) as problem:
+        raise DataError(f"cannot be read: {problem}", where=str(path), mend=mend) from None
+
+
+def read_rows(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
+    """Return the rows of a file by heading without unit.
+
+    Args:
+        path: The file.
+        columns: Headings without unit that it must have.
+
+    Raises:
+        DataError: If it cannot be read or lacks a column.
+    """
+    cells = read_cells(path, "make it again")
+    head = [name.partition(" [")[0] for name in cells[0]] if cells else []
+    missing = [column for column in columns if column not in head]
+    if missing:
+        raise DataError(f"lacks the column {missing[0]}", where=str(path), mend="make it again")
+    # Of two columns that differ in their units only, the first counts.
+    return [dict(reversed([*zip(head, row, strict=False)])) for row in cells[1:]]
+
+
+def number(row: Mapping[str, str], column: str, form: str, factor: float = 1.0) -> str:
+    """Return a number of a row as people read it, "-" where there is none.
+
+    Args:
+        row: The row.
+        column: Heading without unit.
+        form: Format of the number.
+        factor: From the unit of the file to that of the page.
+    """
+    try:
+        value = factor * float(row.get(column, ""))
+    except ValueError:
+        return "-"
+    return format(value, form) if math.isfinite(value) else "-"
