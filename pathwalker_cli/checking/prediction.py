@@ -229,7 +229,7 @@ def _rows(solver: GaitSolver, content: Mapping[str, Any], seconds: Seconds) -> I
 
 def _weights(solver: GaitSolver) -> dict[str, float]:
     """Return the terms of the objective with their weights; those without any are left out."""
-    weights = {name: value for name, value in vars(solver.weights).items() if name != "goals"}
+    weights = solver.weights
     if not solver.config.fits:
         weights |= {"fit": 0.0, "excitation": 0.0}
     named = {
@@ -240,8 +240,7 @@ def _weights(solver: GaitSolver) -> dict[str, float]:
         "fit": "squared distance from the recording",
         "excitation": "squared excitations",
     }
-    terms = {named.get(name, name): value for name, value in weights.items() if value}
-    return terms | {f"goal {n}": v for n, v in solver.config.cost.goals.items() if v}
+    return {named.get(name, f"goal {name}"): value for name, value in weights.items() if value}
 
 
 def _free_springs(solver: GaitSolver) -> list[str]:
