@@ -83,6 +83,7 @@ CONFINED = {
 """Libraries and the parts of the package that may import them."""
 
 
+@cache
 def modules() -> dict[str, Path]:
     """Return every module by its name below the package."""
     found = {}

@@ -33,6 +33,8 @@ from pathwalker_cli.studies.perturbation.result import remark
 from pathwalker_cli.studies.perturbation.study import PerturbationStudy, perturb
 from pathwalker_cli.studies.perturbation.text import perturbation_lines
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 MadeSolution = Callable[..., GaitSolution]
 
 
@@ -77,6 +79,7 @@ def test_shipped_config_holds_the_defaults() -> None:
     assert study == PerturbationStudy(base="mapd-orthosis")
 
 
+@pytest.mark.drawn
 def test_every_free_spring_is_moved_and_stands_beside_the_article(
     call: Callable[..., Result], resolver: StandInResolver, tmp_path: Path
 ) -> None:

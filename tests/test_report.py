@@ -43,6 +43,8 @@ from pathwalker_cli.studies.uncertainty.text import write_uncertainty
 from pathwalker_cli.studies.verdict import verdict_of_metrics
 from report_runs import HOSTILE, made_verdict, write_made_run
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 VOID = frozenset({"meta", "link", "br", "hr", "img", "input", "col"})
 CHILD = Path(__file__).parent / "data" / "child-10y" / "patient.yaml"
 
@@ -147,6 +149,7 @@ def words_of(page: Page) -> str:
 # The page of one patient
 
 
+@pytest.mark.drawn
 def test_a_page_is_self_contained_and_valid(runs: Path, tmp_path: Path) -> None:
     out = tmp_path / "page.html"
     result = report(runs / "mapd-orthosis", runs / "mapd-barefoot", "-o", out)
@@ -378,6 +381,7 @@ def test_runs_of_one_condition_go_by_their_folders(
     assert "&lt;script&gt;" in text
 
 
+@pytest.mark.drawn
 def test_a_name_cannot_be_more_than_text_in_a_figure(
     made_solution: MadeSolution, runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -414,6 +418,7 @@ def test_a_table_with_rows_of_another_width_is_a_mistake() -> None:
         Table(("a", "b"), (Row(("1",)),))
 
 
+@pytest.mark.drawn
 @pytest.mark.usefixtures("no_curves")
 def test_hostile_notes_and_names_of_a_run_stay_text(runs: Path) -> None:
     path = runs / "mapd-orthosis" / "metrics.json"
@@ -565,6 +570,7 @@ def test_studies_beside_a_run_add_their_tables(runs: Path) -> None:
     assert not any(s.title.startswith("Sensitivity") for s in barefoot.sections)
 
 
+@pytest.mark.drawn
 @pytest.mark.usefixtures("no_curves")
 def test_maps_fronts_and_spreads_are_drawn(runs: Path) -> None:
     write_studies(runs, runs / "mapd-orthosis")
@@ -727,6 +733,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.drawn
 def test_recorded_gait_shows_stances_torques_and_strengths(recorded: Path, tmp_path: Path) -> None:
     page = page_of([recorded])
     stances = section(page, "Recorded stances").tables[0].rows

@@ -29,6 +29,8 @@ from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input,
 from pathwalker_cli.studies.uncertainty.result import chance_level, rank_correlations, spreads
 from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, draw_cases, uncertainty
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 MadeSolution = Callable[..., GaitSolution]
 PATIENT = load_patient("sreenivasa2017-patient")
 
@@ -186,6 +188,7 @@ def table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.drawn
 def test_the_command_tells_spreads_limits_and_what_matters(
     call: Callable[..., Result], resolver: StandInResolver, tmp_path: Path
 ) -> None:

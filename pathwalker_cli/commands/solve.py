@@ -140,7 +140,7 @@ def _report(outcome: Outcome, folder: Path) -> None:
         click.echo(summary(metrics, solution.status, solution.cost, bounds))
     click.echo()
     if verdict is not None:
-        click.echo("How sure are the springs?")
+        click.echo(f"How sure are the {'numbers' if verdict.numbers else 'springs'}?")
         _echo_rows(console, verdict_lines(verdict))
         click.echo()
     rows = [*optimum_lines(solution.optima), *detail_lines(solution, metrics)]
@@ -155,12 +155,14 @@ def _echo_rows(console: Console, rows: Iterable[tuple[str, str]]) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    rows = list(rows)
+    width = max(20, *(len(label) for label, _ in rows)) if rows else 20
     if not console.is_terminal:
         for label, text in rows:
-            click.echo(f"{label:<22}{text}")
+            click.echo(f"{label:<{width}}  {text}")
         return
     table = Table.grid(padding=(0, 2))
-    table.add_column(style="dim", no_wrap=True, width=20)
+    table.add_column(style="dim", no_wrap=True, width=width)
     table.add_column()
     for label, text in rows:
         table.add_row(label, Text(text))

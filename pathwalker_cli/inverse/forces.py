@@ -131,11 +131,11 @@ def foot_points(model: pin.Model, q: np.ndarray) -> np.ndarray:
     """Return right heel and toe, left heel and toe (forward, up) [m] in poses, shape (n, 4, 2)."""
     data: Any = model.createData()
     frames = [model.getFrameId(f"{p}_{SUFFIX[s]}") for s in SIDES for p in ("heel", "toe")]
-    found = np.empty((q.shape[0], len(frames), 2))
+    found = np.empty((q.shape[0], len(frames), 3))
     for row, pose in enumerate(q):
         pin.framesForwardKinematics(model, data, pose)
-        found[row] = [data.oMf[frame].translation[[0, 2]] for frame in frames]
-    return found
+        found[row] = [data.oMf[frame].translation for frame in frames]
+    return found[:, :, [0, 2]]
 
 
 def plate_direction(

@@ -11,6 +11,7 @@ from pathwalker_cli.studies.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, NumberVerdict, Verdict
 from pathwalker_cli.studies.verdict_text import (
     PRESCRIBED,
+    number_text,
     per_degree,
     reservations,
     snapped_warning,
@@ -119,6 +120,9 @@ def _facts(verdict: Verdict) -> list[Fact]:
     else:
         others = "not searched for (starts: 8 does)"
     facts = [Fact("Real springs", real), Fact("Other optima", others)]
+    if verdict.numbers:
+        also = ". ".join(f"{number.label}: {number_text(number)}" for number in verdict.numbers)
+        facts.insert(0, Fact("Other numbers that were free", also))
     doubts = [
         f"{measure_of(s.name).label}: {'; '.join(doubts_of)}"
         for s in verdict.springs
