@@ -221,7 +221,10 @@ def _unknowns(
 
 def _check_range(unknown: Unknown, pair: Range) -> None:
     """Refuse a range whose ends the patient's file would not take."""
-    quantity = quantity_at(Patient, unknown.numbers[0].place)
+    place = unknown.numbers[0].place
+    if place.partition(".")[0] not in Patient.model_fields:
+        return  # a number without a key of its own
+    quantity = quantity_at(Patient, place)
     for value in pair:
         if not quantity.lower <= value <= quantity.upper:
             raise ConfigError(

@@ -42,7 +42,7 @@ def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
     Raises:
         DataError: If the file cannot be read; the message names row and column.
     """
-    rows = read_cells(Path(path), "check the path")
+    rows = [row for row in read_cells(Path(path), "check the path", "utf-8-sig") if row]
     if not rows:
         raise DataError("is empty", where=str(path))
     names, units = _header(rows[0], path)
