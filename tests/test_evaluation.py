@@ -31,7 +31,7 @@ from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
 from pathwalker_cli.evaluation.reference import article_stride, reference_stride
 from pathwalker_cli.evaluation.run import gait_of_series
 from pathwalker_cli.evaluation.spread import Spread, spread
-from pathwalker_cli.inverse.bands import POINTS
+from pathwalker_cli.inverse.cycles import POINTS
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.stride.cycle import BOTH_SIDES

@@ -59,7 +59,7 @@ CONFINED = {
     "matplotlib": (
         "animation.film",
         "stride.figures",
-        "inverse.recorded_figures",
+        "inverse.figures",
         "evaluation.ankle_panels",
         "evaluation.cycle_curves",
         "evaluation.figures",

@@ -53,7 +53,7 @@ def _write(out: Path, comparison: Comparison) -> None:
     """Write tables and figures, all or none."""
     from pathwalker_cli.evaluation.figures import save_overlays
     from pathwalker_cli.evaluation.traces import traces
-    from pathwalker_cli.inverse.recorded_files import staged_folder
+    from pathwalker_cli.io.atomic import staged_folder
     from pathwalker_cli.io.json_file import write_json
     from pathwalker_cli.report.compare_text import comparison_content, write_comparison_csv
 
@@ -134,7 +134,7 @@ def _write_evaluation(
     from pathwalker_cli.evaluation.figures import save_evaluation_figures
     from pathwalker_cli.evaluation.files import write_csv
     from pathwalker_cli.evaluation.traces import lone_trace
-    from pathwalker_cli.inverse.recorded_files import staged_folder
+    from pathwalker_cli.io.atomic import staged_folder
     from pathwalker_cli.io.json_file import write_json
 
     with staged_folder(out) as folder:

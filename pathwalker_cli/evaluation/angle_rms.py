@@ -17,7 +17,7 @@ from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.reference import ReferenceStride, left_toe_off_stride
 from pathwalker_cli.evaluation.spread import Spread, spread
-from pathwalker_cli.inverse.bands import cycle_band, resampled
+from pathwalker_cli.inverse.cycles import cycle_band, resampled
 from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.trajectory import Trajectory
 

@@ -7,7 +7,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, SUFFIX, Side
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.recorded import RecordedGait
-from pathwalker_cli.inverse.bands import POINTS
+from pathwalker_cli.inverse.cycles import POINTS
 from pathwalker_cli.inverse.strengths import stance_curves
 
 __all__ = ["ankle_line", "ankle_profile", "recorded_ankle_profiles"]

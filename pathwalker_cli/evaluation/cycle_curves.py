@@ -24,7 +24,7 @@ from pathwalker_cli.conventions import (
 from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.traces import Trace
-from pathwalker_cli.inverse.bands import POINTS
+from pathwalker_cli.inverse.cycles import POINTS
 from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION, Band
 from pathwalker_cli.stride.figures.style import dress, percent_axis, zero_line
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, Side
-from pathwalker_cli.inverse.bands import POINTS
+from pathwalker_cli.inverse.cycles import POINTS
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.stride.cycle import STRIKE_PHASE, TOE_OFF_PHASE

@@ -12,7 +12,7 @@ from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.spread import Spread, spread
 from pathwalker_cli.inverse.cycles import GaitCycle, step_lengths, walking_speed
-from pathwalker_cli.inverse.filters import frame_rate
+from pathwalker_cli.inverse.dynamics import frame_rate
 from pathwalker_cli.inverse.forces import foot_extents
 from pathwalker_cli.io.c3d import Event
 from pathwalker_cli.stride.cycle import BOTH_SIDES

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pathwalker_cli.conventions import SUFFIX, Side
-from pathwalker_cli.inverse.bands import POINTS, resampled
-from pathwalker_cli.inverse.cycles import GaitCycle, Stance, stances
-from pathwalker_cli.inverse.evaluate import StudyTrial, recorded_trials
+from pathwalker_cli.inverse.cycles import POINTS, GaitCycle, Stance, resampled, stances
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
+from pathwalker_cli.inverse.trials import Trial, recorded_trials
 from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.model.walker import Walker
 
@@ -28,18 +27,18 @@ class RecordedGait:
     """
 
     walker: Walker
-    trials: tuple[StudyTrial, ...]
+    trials: tuple[Trial, ...]
 
-    def trial(self, name: str) -> StudyTrial | None:
+    def trial(self, name: str) -> Trial | None:
         """Return the trial of this name, or None."""
         return next((each for each in self.trials if each.name == name), None)
 
-    def cycles(self, side: Side) -> Iterator[tuple[StudyTrial, GaitCycle]]:
+    def cycles(self, side: Side) -> Iterator[tuple[Trial, GaitCycle]]:
         """Yield every complete gait cycle of a side with its trial."""
         for trial in self.trials:
             yield from ((trial, cycle) for cycle in trial.cycles if cycle.side == side)
 
-    def stances(self, side: Side) -> Iterator[tuple[StudyTrial, Stance]]:
+    def stances(self, side: Side) -> Iterator[tuple[Trial, Stance]]:
         """Yield every complete stance of a side with its trial, measured or not."""
         for trial in self.trials:
             yield from ((trial, each) for each in stances(trial.events) if each.side == side)
@@ -110,7 +109,7 @@ def recorded_gait(walker: Walker) -> RecordedGait | None:
     return RecordedGait(walker, tuple(trials))
 
 
-def _forces(trial: StudyTrial, side: Side) -> np.ndarray:
+def _forces(trial: Trial, side: Side) -> np.ndarray:
     """Return (forward, up) on a foot in every frame [N], NaN where not measured, shape (n, 2)."""
     if trial.forces is None:
         raise ValueError(f"trial {trial.name} has no forces")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.evaluation.paper import PATIENT, REFERENCE_STRIDES
 from pathwalker_cli.evaluation.recorded import RecordedGait
-from pathwalker_cli.inverse.evaluate import StudyTrial
+from pathwalker_cli.inverse.trials import Trial
 from pathwalker_cli.trajectory import Trajectory
 
 __all__ = ["ReferenceStride", "article_stride", "left_toe_off_stride", "reference_stride"]
@@ -81,7 +81,7 @@ def reference_stride(recorded: RecordedGait, name: str | None = None) -> Referen
     return found
 
 
-def left_toe_off_stride(trial: StudyTrial) -> ReferenceStride | None:
+def left_toe_off_stride(trial: Trial) -> ReferenceStride | None:
     """Return the first stride of a trial from one left toe-off to the next, or None."""
     offs = _left_toe_offs(trial)
     if len(offs) < 2:
@@ -89,7 +89,7 @@ def left_toe_off_stride(trial: StudyTrial) -> ReferenceStride | None:
     return ReferenceStride(trial.name, _rows(trial.motion, offs[0], offs[1]))
 
 
-def _left_toe_offs(trial: StudyTrial) -> list[int]:
+def _left_toe_offs(trial: Trial) -> list[int]:
     """Return the frames in which the left toe leaves the ground."""
     return [e.frame for e in trial.events if (e.side, e.kind) == ("left", "toe_off")]
 

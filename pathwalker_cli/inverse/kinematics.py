@@ -10,8 +10,7 @@ import pinocchio as pin
 
 from pathwalker_cli.conventions import COORDINATES, TRANSLATIONS, coordinate_unit
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.direction import WalkingPlane, walking_plane
-from pathwalker_cli.inverse.markers import MarkerPoint
+from pathwalker_cli.inverse.markers import MarkerPoint, WalkingPlane, walking_plane
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.trajectory import Trajectory
 
@@ -71,7 +70,7 @@ def inverse_kinematics(
         model: The walker, its q in the order of `COORDINATES`.
         recording: The recording.
         points: Where its markers sit on the walker.
-        plane: Walking plane; found from the travel of the pelvis markers if left out.
+        plane: Walking plane; that of the pelvis markers' travel if left out.
 
     Returns:
         The coordinates over time, time from the first frame on, and the distances that remain.
@@ -98,8 +97,8 @@ def inverse_kinematics(
 
 def pelvis_markers(points: tuple[MarkerPoint, ...]) -> tuple[str, ...]:
     """Return the markers on the pelvis, or all if there are none."""
-    found = tuple(point.marker for point in points if point.link == "pelvis")
-    return found or tuple(point.marker for point in points)
+    pelvis = [point for point in points if point.link == "pelvis"]
+    return tuple(point.marker for point in pelvis or points)
 
 
 def marker_paths(model: pin.Model, points: tuple[MarkerPoint, ...], q: np.ndarray) -> np.ndarray:
@@ -130,7 +129,8 @@ class _Fit:
         q = np.zeros(self.model.nq)
         seen = np.isfinite(target[:, 0])
         if seen.any():
-            q[:2] = (target - self.positions(q)[0])[seen].mean(axis=0)
+            moved = (target - self.positions(q)[0])[seen].mean(axis=0)
+            q[[COORDINATES.index(name) for name in TRANSLATIONS]] = moved
         return q
 
     def positions(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

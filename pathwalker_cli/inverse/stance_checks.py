@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import Side
-from pathwalker_cli.inverse.cycles import Stance, swings
+from pathwalker_cli.inverse.cycles import OTHER, Stance, single_support
 from pathwalker_cli.io.c3d import Event
 
 __all__ = ["LOADED", "Evidence", "StanceForce", "judge", "outside"]
@@ -43,8 +43,6 @@ JUMP: Final = 0.02
 """Distance by which the body's whole weight may seem to jump ahead on a plate when the other foot
 strikes [m]: a second foot 0.4 m ahead shows from a twentieth of the weight on.  In the shipped
 recordings a foot that stands alone gives up to 0.008, two feet give 0.03 and more."""
-
-_OTHER: Final[Mapping[Side, Side]] = {"right": "left", "left": "right"}
 
 
 @dataclass(frozen=True)
@@ -88,7 +86,7 @@ class Evidence:
 
 def judge(stance: Stance, seen: Evidence) -> StanceForce:
     """Return the plate that carried a stance alone, or why there is none."""
-    rows = _single_support(stance, seen.events)
+    rows = single_support(stance, seen.events)
     if not rows.size:
         rows = np.arange(stance.strike, stance.toe_off + 1)
     plate = int(np.argmax(seen.up[rows].sum(axis=0)))
@@ -119,7 +117,7 @@ def _loaded_before_or_after(stance: Stance, plate: int, seen: Evidence) -> str:
 
 def _second_foot(stance: Stance, plate: int, seen: Evidence) -> str:
     """Return whether the other foot struck the plate too, while the standing one was on it."""
-    other = _OTHER[stance.side]
+    other = OTHER[stance.side]
     strikes = [e.frame for e in seen.events if (e.side, e.kind) == (other, "foot_strike")]
     for strike in strikes:
         if stance.strike < strike <= stance.toe_off and _struck(plate, strike, seen):
@@ -165,21 +163,12 @@ def _not_under_the_foot(stance: Stance, plate: int, seen: Evidence) -> str:
 
 def _not_the_body(stance: Stance, plate: int, seen: Evidence) -> str:
     """Return whether the plate carries less or more than the body in single support."""
-    single = _single_support(stance, seen.events)
+    single = single_support(stance, seen.events)
     load, carried = seen.up[single, plate], seen.carried[single]
     share = float(load.mean() / carried.mean()) if single.size else 0.0
     if SUPPORT[0] < share < SUPPORT[1]:
         return ""
     return f"plate {plate + 1} carries {share:.0%} of the body in single support"
-
-
-def _single_support(stance: Stance, events: tuple[Event, ...]) -> np.ndarray:
-    """Return the frames of a stance in which the other foot is in the air."""
-    frames = np.arange(stance.strike, stance.toe_off + 1)
-    alone = [
-        (frames > off) & (frames < strike) for off, strike in swings(events, _OTHER[stance.side])
-    ]
-    return frames[np.any(alone, axis=0)] if alone else frames[:0]
 
 
 _CHECKS: Final[tuple[Callable[[Stance, int, Evidence], str], ...]] = (

@@ -12,8 +12,8 @@ from pydantic import Field, field_validator, model_validator
 from pathwalker_cli.config import patient_path, place_of, read_config
 from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.inverse.filters import MOTION_CUTOFF
-from pathwalker_cli.inverse.gaps import LONGEST_GAP
+from pathwalker_cli.inverse.dynamics import MOTION_CUTOFF
+from pathwalker_cli.inverse.markers import LONGEST_GAP
 from pathwalker_cli.io.fields import Quantity, YamlModel, invalid
 
 __all__ = [

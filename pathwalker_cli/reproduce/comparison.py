@@ -15,7 +15,7 @@ from pathwalker_cli.evaluation.numbers import recorded_numbers
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperNumber
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.evaluation.spread import Spread
-from pathwalker_cli.inverse.bands import cycle_band
+from pathwalker_cli.inverse.cycles import cycle_band
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce.results import InverseResult, ProblemResult, Results
 from pathwalker_cli.stride.cycle import BOTH_SIDES

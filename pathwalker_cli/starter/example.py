@@ -16,13 +16,12 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
-from pathwalker_cli.conventions import SIDES, Condition, Side
+from pathwalker_cli.conventions import SIDES, Condition
 from pathwalker_cli.inverse.cycles import Stance, stances
-from pathwalker_cli.inverse.filters import frame_rate
-from pathwalker_cli.inverse.forces import foot_points
+from pathwalker_cli.inverse.dynamics import frame_rate
+from pathwalker_cli.inverse.forces import foot_extents, foot_points, plate_channels
 from pathwalker_cli.inverse.kinematics import marker_paths
 from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set, marker_points
-from pathwalker_cli.inverse.plates import plate_channels
 from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
 from pathwalker_cli.io.c3d_write import write_c3d
 from pathwalker_cli.io.recordings import CompactRecording, read_recording, recording_names
@@ -142,7 +141,8 @@ def _played(trial: CompactRecording, child: _Body, other: _Body) -> _Played:
     count = int((len(values) - 1) * slower) + 1
     frames = np.arange(count) / slower
     q = CubicSpline(np.arange(len(values)), values)(frames)
-    q[:, 1] -= foot_points(child.model, q)[:, :, 1].min(axis=1).mean()
+    soles = np.hstack([points[..., 1] for points in foot_points(child.model, q).values()])
+    q[:, 1] -= soles.min(axis=1).mean()
     events = tuple(
         Event(event.side, event.kind, round(event.frame * slower))
         for event in trial.events
@@ -202,7 +202,7 @@ def _load(
     assert trial.forces is not None  # noqa: S101 - shipped recordings have forces
     rows = slice(stance.strike, stance.toe_off + 1)
     known = np.arange(stance.strike, stance.toe_off + 1)
-    heel, toe = _foot(other.model, trial.motion.values[rows], side).T
+    heel, toe = foot_extents(other.model, trial.motion.values[rows])[side].T
     centre = trial.forces[f"cop_{side[0]}_x"][rows]
     seen = np.isfinite(centre)
     centre = np.interp(known, known[seen], centre[seen])
@@ -214,12 +214,6 @@ def _load(
         values = np.nan_to_num(trial.forces[f"force_{side[0]}_{name}"][rows])
         force[inside, axis] = np.interp(played.frames[inside], known, values)
     force *= child.mass / other.mass
-    heel, toe = _foot(child.model, played.q, side).T
+    heel, toe = foot_extents(child.model, played.q)[side].T
     share, beyond = (np.interp(played.frames, known, values) for values in (share, beyond))
     return force, heel + share * (toe - heel) + beyond
-
-
-def _foot(model: pin.Model, q: np.ndarray, side: Side) -> np.ndarray:
-    """Return the forward positions of heel and toe [m], shape (n, 2)."""
-    first = 2 * SIDES.index(side)
-    return foot_points(model, q)[:, first : first + 2, 0]

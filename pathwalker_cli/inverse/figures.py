@@ -16,14 +16,15 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.conventions import GRAVITY, SUFFIX, Side, to_degrees
-from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.bands import POINTS, CycleBand, cycle_band
-from pathwalker_cli.inverse.cycles import GaitCycle
-from pathwalker_cli.inverse.evaluate import StudyTrial
-from pathwalker_cli.io.atomic import atomic_path
-from pathwalker_cli.stride.cycle import BOTH_SIDES
-from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION
+from pathwalker_cli.conventions import GRAVITY, SIDES, SUFFIX, Condition, Side, to_degrees
+from pathwalker_cli.errors import DataError, InputError
+from pathwalker_cli.inverse.cycles import POINTS, CycleBand, cycle_band, gait_cycles
+from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.io.recordings import read_recording, recording_names
+from pathwalker_cli.model.skeleton import PLANAR_WALKER
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION, Band, Reference
+from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
     LINE_STYLE,
@@ -45,10 +46,14 @@ __all__ = [
     "joint_torque_figure",
     "marker_figure",
     "name_figure",
+    "recorded_reference",
     "save_recorded_figures",
 ]
 
-DPI: Final = 200
+_RANGE: Final = "#9ecae1"
+"""Light blue of a range that belongs to no side."""
+
+_PERCENT: Final = np.linspace(0.0, 100.0, POINTS)
 
 _ANGLES: Final = {
     "pelvis_tilt": ("Pelvis", "forward tilt [deg]"),
@@ -68,6 +73,35 @@ _FORCES: Final = {
 }
 
 
+def recorded_reference(patient: Patient, condition: Condition) -> Reference | None:
+    """Return recorded joint angles as bands to draw behind those of a prediction.
+
+    Args:
+        patient: The patient.
+        condition: Condition of the recordings beside the patient's file.
+
+    Returns:
+        The bands, or None without usable recordings, which a prediction does not need.
+    """
+    try:
+        names = recording_names(patient, condition)
+        recordings = [read_recording(patient, condition, name) for name in names]
+        trials = [(each.motion, gait_cycles(each.events)) for each in recordings]
+        bands = {side: cycle_band(trials, side) for side in SIDES}
+    except InputError:
+        return None
+    angles = {}
+    for side, band in bands.items():
+        for joint in PLANAR_WALKER.joints:
+            if not joint.slides and joint.side in (None, side):
+                name = joint.coordinate
+                key = name if joint.side else f"{name}_{SUFFIX[side]}"
+                i = band.names.index(name)
+                curves = (band.lowest[:, i], band.mean[:, i], band.highest[:, i])
+                angles[key] = Band(_PERCENT, *curves)
+    return Reference(angles=angles)
+
+
 @dataclass(frozen=True)
 class _Bands:
     """Bands of both sides and when their feet leave the ground [%]."""
@@ -76,7 +110,7 @@ class _Bands:
     toe_off: Mapping[Side, float]
 
 
-def joint_angle_figure(trials: Sequence[StudyTrial]) -> Figure:
+def joint_angle_figure(trials: Sequence[Trial]) -> Figure:
     """Return pelvis, hip, knee, ankle and lumbar angles over the gait cycle of each side.
 
     Flexion, dorsiflexion and forward lean are positive, as gait laboratories plot them.
@@ -95,7 +129,7 @@ def joint_angle_figure(trials: Sequence[StudyTrial]) -> Figure:
     return fig
 
 
-def joint_torque_figure(trials: Sequence[StudyTrial], body_mass: float) -> Figure:
+def joint_torque_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
     """Return net joint torques per body mass over the gait cycle of each side.
 
     Internal torques; extension and plantarflexion are positive.  Only strides whose stance has a
@@ -115,7 +149,7 @@ def joint_torque_figure(trials: Sequence[StudyTrial], body_mass: float) -> Figur
     return fig
 
 
-def ground_force_figure(trials: Sequence[StudyTrial], body_mass: float) -> Figure:
+def ground_force_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
     """Return vertical and fore-aft ground reaction forces over the gait cycle of each side.
 
     Args:
@@ -130,18 +164,16 @@ def ground_force_figure(trials: Sequence[StudyTrial], body_mass: float) -> Figur
     return fig
 
 
-def marker_figure(trials: Sequence[StudyTrial]) -> Figure:
+def marker_figure(trials: Sequence[Trial]) -> Figure:
     """Return the distance between every marker and the walker, mean and range over trials.
 
     Args:
         trials: Trials of one condition from C3D files.
     """
-    found = [trial.markers.rms() for trial in trials if trial.markers is not None]
-    names = list(found[0])
-    values = 1e3 * np.array([[rms[name] for name in names] for rms in found])
-    known: np.ndarray = np.any(np.isfinite(values), axis=0)
-    names = [names[i] for i in np.flatnonzero(known)]
-    values = values[:, known]
+    each = [trial.markers.rms() for trial in trials if trial.markers is not None]
+    rms = {name: 1e3 * np.array([trial[name] for trial in each]) for name in each[0]}
+    rms = {name: values for name, values in rms.items() if np.isfinite(values).any()}
+    names, values = list(rms), np.column_stack(list(rms.values()))
     mean = np.nanmean(values, axis=0)
     fig = new_figure(0.9 + 0.17 * len(names))
     ax = fig.subplots()
@@ -149,21 +181,21 @@ def marker_figure(trials: Sequence[StudyTrial]) -> Figure:
     ax.grid(visible=False, axis="y")
     rows = np.arange(len(names))
     low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
-    ax.hlines(rows, low, high, color="#9ecae1", linewidth=5.0)
+    ax.hlines(rows, low, high, color=_RANGE, linewidth=5.0)
     ax.plot(mean, rows, "o", color=LINE_COLOUR["right"], markersize=4.0)
     ax.set_yticks(rows, [_plain(name) for name in names])
     ax.set_ylim(len(names) - 0.5, -0.5)
     ax.set_xlim(left=0.0)
     handles: list[Artist] = [
         Line2D([], [], color=LINE_COLOUR["right"], marker="o", linestyle="", label="mean"),
-        Patch(facecolor="#9ecae1", label=f"range over {_counted(len(found), 'trial')}"),
+        Patch(facecolor=_RANGE, label=f"range over {_counted(len(each), 'trial')}"),
     ]
     legend(fig, handles)
     return fig
 
 
 def save_recorded_figures(
-    trials: Sequence[StudyTrial],
+    trials: Sequence[Trial],
     folder: str | Path,
     body_mass: float,
     formats: Sequence[str] = ("png", "svg"),
@@ -179,21 +211,17 @@ def save_recorded_figures(
     makers: dict[str, Callable[[], Figure]] = {}
     if any(trial.cycles for trial in trials):
         makers["joint_angles"] = lambda: joint_angle_figure(trials)
-    if any(_measured(trial, cycle) for trial in trials if trial.tau for cycle in trial.cycles):
+    if any(trial.measured(cycle) for trial in trials if trial.tau for cycle in trial.cycles):
         makers["joint_torques"] = lambda: joint_torque_figure(trials, body_mass)
         makers["ground_forces"] = lambda: ground_force_figure(trials, body_mass)
     if any(trial.markers is not None for trial in trials):
         makers["marker_residuals"] = lambda: marker_figure(trials)
-    names = []
-    with mpl.rc_context(STYLE):
-        for name, maker in makers.items():
-            figure = maker()
+    names: list[str] = []
+    for name, make in makers.items():
+        with mpl.rc_context(STYLE):
+            figure = make()
             name_figure(figure, f"{trials[0].condition}, {_counted(len(trials), 'trial')}")
-            for extension in formats:
-                names.append(f"{name}.{extension}")
-                metadata = {"Software": None} if extension == "png" else {"Date": None}
-                with atomic_path(Path(folder) / names[-1]) as temporary:
-                    figure.savefig(temporary, format=extension, dpi=DPI, metadata=metadata)
+        names += save_formats(figure, folder, name, formats)
     return tuple(names)
 
 
@@ -206,8 +234,8 @@ def name_figure(figure: Figure, words: str) -> None:
 
 
 def _bands(
-    trials: Sequence[StudyTrial],
-    columns: Callable[[StudyTrial], Trajectory | None],
+    trials: Sequence[Trial],
+    columns: Callable[[Trial], Trajectory | None],
     measured: bool = False,
 ) -> _Bands:
     """Return the bands of the sides of which the trials show a complete gait cycle.
@@ -221,11 +249,11 @@ def _bands(
     for trial in trials:
         table = columns(trial)
         if table is not None:
-            cycles = tuple(c for c in trial.cycles if not measured or _measured(trial, c))
+            cycles = tuple(c for c in trial.cycles if not measured or trial.measured(c))
             curves.append((table, cycles))
     sides: dict[Side, CycleBand] = {}
     toe_off: dict[Side, float] = {}
-    for side in BOTH_SIDES:
+    for side in SIDES:
         own = [cycle for _, cycles in curves for cycle in cycles if cycle.side == side]
         if own:
             sides[side] = cycle_band(curves, side)
@@ -234,16 +262,6 @@ def _bands(
     if not sides:
         raise DataError("the trials show no complete gait cycle")
     return _Bands(sides, toe_off)
-
-
-def _measured(trial: StudyTrial, cycle: GaitCycle) -> bool:
-    """Return whether the force of the stance that begins a cycle is known."""
-    if trial.published is not None:
-        return True
-    return any(
-        item.measured and (item.stance.side, item.stance.strike) == (cycle.side, cycle.start)
-        for item in trial.stances
-    )
 
 
 def _panel(ax: Axes, bands: _Bands, pattern: str, factor: float, title: str, label: str) -> None:
@@ -259,7 +277,6 @@ def _panel(ax: Axes, bands: _Bands, pattern: str, factor: float, title: str, lab
     """
     dress(ax, title, y=label)
     zero_line(ax)
-    percent = np.linspace(0.0, 100.0, POINTS)
     for side, band in bands.sides.items():
         column = band.names.index(pattern.format(SUFFIX[side]))
         count = band.count[:, column]
@@ -270,10 +287,10 @@ def _panel(ax: Axes, bands: _Bands, pattern: str, factor: float, title: str, lab
             np.where(count == count.max(), factor * curve[:, column], np.nan) for curve in curves
         )
         colour, style = LINE_COLOUR[side], LINE_STYLE[side]
-        ax.fill_between(percent, low, high, color=colour, alpha=0.18, linewidth=0)
+        ax.fill_between(_PERCENT, low, high, color=colour, alpha=0.18, linewidth=0)
         for edge in (low, high):  # so that the ranges of both sides differ without colour too
-            ax.plot(percent, edge, color=colour, linestyle=style, linewidth=0.5, alpha=0.7)
-        ax.plot(percent, mean, color=colour, linestyle=style)
+            ax.plot(_PERCENT, edge, color=colour, linestyle=style, linewidth=0.5, alpha=0.7)
+        ax.plot(_PERCENT, mean, color=colour, linestyle=style)
         ax.axvline(bands.toe_off[side], linewidth=0.6, color=colour, linestyle=style)
     percent_axis(ax)
 
