@@ -60,8 +60,7 @@ CONFINED = {
         "animation.film",
         "stride.figures",
         "inverse.figures",
-        "evaluation.ankle_panels",
-        "evaluation.cycle_curves",
+        "evaluation.curves",
         "evaluation.figures",
         "report.figures",
         "reproduce.figures",
@@ -83,6 +82,7 @@ CONFINED = {
 """Libraries and the parts of the package that may import them."""
 
 
+@cache
 def modules() -> dict[str, Path]:
     """Return every module by its name below the package."""
     found = {}

@@ -31,6 +31,8 @@ from pathwalker_cli.studies.landscape.solve import grid, landscape_of, with_spri
 from pathwalker_cli.studies.landscape.study import Axis, LandscapeStudy, axis_values
 from pathwalker_cli.studies.landscape.text import landscape_lines
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 COARSE = ("dorsiflexion.points=4", "plantarflexion=[5, 20, 80]")
 
 Make = Callable[..., tuple[Landscape, MadeResolver]]
@@ -226,6 +228,7 @@ def test_barefoot_has_no_landscape(tmp_path: Path) -> None:
 # Files, figure, words
 
 
+@pytest.mark.drawn
 def test_files(made: Make, tmp_path: Path) -> None:
     landscape, _ = made(leaps=True)
     write_landscape(tmp_path / "out", landscape)

@@ -30,6 +30,8 @@ from pathwalker_cli.patient import load_patient
 from pathwalker_cli.patient.blocks import Strengths
 from pathwalker_cli.trajectory import Trajectory
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 PATIENT = "sreenivasa2017-patient"
 RECORDINGS = Path(__file__).parents[2] / "shared" / "recordings"
 needs_recordings = pytest.mark.skipif(
@@ -203,6 +205,7 @@ def test_another_mass_is_a_warning(tmp_path: Path) -> None:
     assert "are body_mass 40 kg and the segment lengths" in warnings[0]
 
 
+@pytest.mark.drawn
 def test_kinematics_study(tmp_path: Path) -> None:
     source, out = write_c3d(tmp_path / "walk.c3d"), tmp_path / "out"
     result = run(ik_command, "inverse-kinematics", "--out", out,
@@ -295,6 +298,7 @@ def test_a_marker_set_must_fix_all_coordinates(points: str, tmp_path: Path) -> N
     assert re.search("marker set: has [01] points for barefoot; allowed: at least 5", message)
 
 
+@pytest.mark.drawn
 def test_dynamics_of_the_shipped_recordings(tmp_path: Path) -> None:
     """The whole command on a fresh install, and the numbers of its tables."""
     out = tmp_path / "out"

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from helpers import called_apart
 from made_c3d import cut, text, write_c3d
 from pathwalker_cli.paths import shipped
 
-COMMAND = [sys.executable, "-c", "from pathwalker_cli.cli import main; main()"]
 C3D = "walk.c3d"
 
 Words = list[str]
@@ -110,9 +108,7 @@ def test_bad_input_is_one_sentence_and_leaves_nothing(fault: str, tmp_path: Path
     make, words, said = FAULTS[fault]
     make(tmp_path / C3D)
     before = sorted(tmp_path.rglob("*"))
-    done = subprocess.run(
-        [*COMMAND, *words], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = called_apart(tmp_path, *words)
     assert done.returncode == 2, done.stderr
     assert done.stdout == ""
     assert done.stderr.startswith("Error: ")

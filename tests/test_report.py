@@ -22,7 +22,6 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.config.values import changed_values, differing_values
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.inverse.study import load_inverse_dynamics
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report import figures
@@ -31,9 +30,9 @@ from pathwalker_cli.report.gait_page import gait_page
 from pathwalker_cli.report.html import page_html, page_of
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.springs import recommended, spring_section, verdict_words
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.landscape.files import write_landscape
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
-from pathwalker_cli.studies.measures import MEASURES
 from pathwalker_cli.studies.pool import Solved
 from pathwalker_cli.studies.tradeoff.files import write_tradeoff
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
@@ -42,6 +41,8 @@ from pathwalker_cli.studies.uncertainty.result import Uncertainty
 from pathwalker_cli.studies.uncertainty.text import write_uncertainty
 from pathwalker_cli.studies.verdict import verdict_of_metrics
 from report_runs import HOSTILE, made_verdict, write_made_run
+
+pytestmark = pytest.mark.usefixtures("sketched")
 
 VOID = frozenset({"meta", "link", "br", "hr", "img", "input", "col"})
 CHILD = Path(__file__).parent / "data" / "child-10y" / "patient.yaml"
@@ -147,6 +148,7 @@ def words_of(page: Page) -> str:
 # The page of one patient
 
 
+@pytest.mark.drawn
 def test_a_page_is_self_contained_and_valid(runs: Path, tmp_path: Path) -> None:
     out = tmp_path / "page.html"
     result = report(runs / "mapd-orthosis", runs / "mapd-barefoot", "-o", out)
@@ -198,13 +200,13 @@ def test_numbers_of_the_page_are_those_of_the_runs(runs: Path) -> None:
         ("effort_per_distance", "effort per distance"),
     ):
         barefoot, orthosis = (run.evaluation.row(key) for run in found)
-        assert rows[label][2] == number_text(barefoot.value, barefoot.quantity)
-        assert rows[label][5] == number_text(orthosis.value, orthosis.quantity)
+        assert rows[label][2] == barefoot.measure.text(barefoot.value)
+        assert rows[label][5] == orthosis.measure.text(orthosis.value)
         assert rows[label][4] == (barefoot.position or "")
         assert barefoot.value is not None
         assert orthosis.value is not None
         change = orthosis.value - barefoot.value
-        assert rows[label][8] == number_text(change, barefoot.quantity, sign=True)
+        assert rows[label][8] == barefoot.measure.text(change, sign=True)
     metrics = found[0].run.metrics
     shares = [metrics[f"stance_share_{side}"] for side in ("right", "left")]
     assert rows["stance share, left"][2] == f"{100 * shares[1]:.1f}"
@@ -378,6 +380,7 @@ def test_runs_of_one_condition_go_by_their_folders(
     assert "&lt;script&gt;" in text
 
 
+@pytest.mark.drawn
 def test_a_name_cannot_be_more_than_text_in_a_figure(
     made_solution: MadeSolution, runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -414,6 +417,7 @@ def test_a_table_with_rows_of_another_width_is_a_mistake() -> None:
         Table(("a", "b"), (Row(("1",)),))
 
 
+@pytest.mark.drawn
 @pytest.mark.usefixtures("no_curves")
 def test_hostile_notes_and_names_of_a_run_stay_text(runs: Path) -> None:
     path = runs / "mapd-orthosis" / "metrics.json"
@@ -489,7 +493,7 @@ def write_studies(folder: Path, run: Path, note: str = "") -> None:
     for name, content in contents.items():
         (folder / name).parent.mkdir(parents=True)
         (folder / name).write_text(json.dumps(content))
-    numbers = {measure.key: float(metrics[measure.key]) for measure in MEASURES}
+    numbers = {measure.key: float(metrics[measure.key]) for measure in measures_in("studies")}
     write_landscape(folder / "landscape", made_landscape(metrics, numbers))
     write_tradeoff(folder / "tradeoff", made_tradeoff(metrics, numbers))
     result = made_uncertainty(metrics, numbers)
@@ -565,6 +569,7 @@ def test_studies_beside_a_run_add_their_tables(runs: Path) -> None:
     assert not any(s.title.startswith("Sensitivity") for s in barefoot.sections)
 
 
+@pytest.mark.drawn
 @pytest.mark.usefixtures("no_curves")
 def test_maps_fronts_and_spreads_are_drawn(runs: Path) -> None:
     write_studies(runs, runs / "mapd-orthosis")
@@ -728,6 +733,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.drawn
 def test_recorded_gait_shows_stances_torques_and_strengths(recorded: Path, tmp_path: Path) -> None:
     page = page_of([recorded])
     stances = section(page, "Recorded stances").tables[0].rows

@@ -30,6 +30,8 @@ from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 from pathwalker_cli.studies.tradeoff.study import TradeoffStudy, chain, tradeoff_of
 from pathwalker_cli.studies.tradeoff.text import tradeoff_lines
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 FOUR = ("walking_speed_weights=[0, 0.5, 1, 2]",)
 ROUGH = (5e-3, 5e-2)
 """Re-integration errors that the mesh tolerances of the config refuse."""
@@ -220,6 +222,7 @@ def test_a_fit_has_no_trade_off(tmp_path: Path) -> None:
 # Files, figure, command
 
 
+@pytest.mark.drawn
 def test_files_and_figure(made: Make, tmp_path: Path) -> None:
     tradeoff, _ = made()
     write_tradeoff(tmp_path / "out", tradeoff)
