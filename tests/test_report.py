@@ -727,9 +727,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setattr(files, "save_recorded_figures", lambda *_: ())
         files.write_dynamics(
             folder, trials, residual_tables(trials, patient, study),
-            strength_table(trials, patient, study), patient.body_mass, study.method,
+            strength_table(trials, patient, study), patient, study.method,
         )  # fmt: skip
-        files.write_origin(folder, patient, study.method)
     return folder
 
 

@@ -119,7 +119,7 @@ def id_command(
     With --update-patient the blocks `strengths` and `recorded` of the patient's file are replaced,
     or added; everything else in it, comments too, stays as it is.
     """
-    from pathwalker_cli.inverse.files import write_dynamics, write_origin
+    from pathwalker_cli.inverse.files import write_dynamics
     from pathwalker_cli.inverse.recorded import require_own_patient
     from pathwalker_cli.inverse.residuals import residual_tables, study_warnings
     from pathwalker_cli.inverse.strengths import strength_table
@@ -135,8 +135,7 @@ def id_command(
     def write(folder: Path, trials: Sequence[Trial], patient: Patient) -> _Findings:
         tables = residual_tables(trials, patient, study)
         strengths = strength_table(trials, patient, study)
-        write_dynamics(folder, trials, tables, strengths, patient.body_mass, study.method)
-        write_origin(folder, patient, study.method)
+        write_dynamics(folder, trials, tables, strengths, patient, study.method)
         warnings = study_warnings(trials, tables, patient, study.largest_residual)
         shown = (residuals_renderable(tables), strengths_renderable(strengths))
         changed = _updated(patient, trials, strengths, study.method) if update_patient else ""

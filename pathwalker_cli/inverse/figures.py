@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -55,51 +55,27 @@ _RANGE: Final = "#9ecae1"
 
 _PERCENT: Final = np.linspace(0.0, 100.0, POINTS)
 
-_ANGLES: Final = {
-    "pelvis_tilt": ("Pelvis", "forward tilt [deg]"),
-    "hip": ("Hip", "flexion [deg]"),
-    "knee": ("Knee", "flexion [deg]"),
-    "ankle": ("Ankle", "dorsiflexion [deg]"),
-    "lumbar": ("Trunk against pelvis", "forward lean [deg]"),
+Panels = Mapping[str, tuple[str, str, float]]
+"""By column, with "{}" for the suffix of a side: title, label of the y axis with unit, and factor
+from the column's unit and sign to the panel's."""
+
+_DEGREES: Final = float(to_degrees(1.0))
+_ANGLES: Final[Panels] = {
+    "pelvis_tilt": ("Pelvis", "forward tilt [deg]", _DEGREES),
+    "hip_{}": ("Hip", "flexion [deg]", CLINICAL_ANGLE["hip"] * _DEGREES),
+    "knee_{}": ("Knee", "flexion [deg]", CLINICAL_ANGLE["knee"] * _DEGREES),
+    "ankle_{}": ("Ankle", "dorsiflexion [deg]", CLINICAL_ANGLE["ankle"] * _DEGREES),
+    "lumbar": ("Trunk against pelvis", "forward lean [deg]", _DEGREES),
 }
-_TORQUES: Final = {
-    "hip": "Hip, extension +",
-    "knee": "Knee, extension +",
-    "ankle": "Ankle, plantarflexion +",
+_TORQUES: Final[Panels] = {
+    "hip_{}": ("Hip, extension +", "net torque [N m/kg]", EXTENSION["hip"]),
+    "knee_{}": ("Knee, extension +", "net torque [N m/kg]", EXTENSION["knee"]),
+    "ankle_{}": ("Ankle, plantarflexion +", "net torque [N m/kg]", EXTENSION["ankle"]),
 }
-_FORCES: Final = {
-    "z": ("Vertical, up +", "vertical force [% body weight]"),
-    "x": ("Fore-aft, forward +", "fore-aft force [% body weight]"),
+_FORCES: Final[Panels] = {
+    "force_{}_z": ("Vertical, up +", "vertical force [% body weight]", 100.0 / GRAVITY),
+    "force_{}_x": ("Fore-aft, forward +", "fore-aft force [% body weight]", 100.0 / GRAVITY),
 }
-
-
-def recorded_reference(patient: Patient, condition: Condition) -> Reference | None:
-    """Return recorded joint angles as bands to draw behind those of a prediction.
-
-    Args:
-        patient: The patient.
-        condition: Condition of the recordings beside the patient's file.
-
-    Returns:
-        The bands, or None without usable recordings, which a prediction does not need.
-    """
-    try:
-        names = recording_names(patient, condition)
-        recordings = [read_recording(patient, condition, name) for name in names]
-        trials = [(each.motion, gait_cycles(each.events)) for each in recordings]
-        bands = {side: cycle_band(trials, side) for side in SIDES}
-    except InputError:
-        return None
-    angles = {}
-    for side, band in bands.items():
-        for joint in PLANAR_WALKER.joints:
-            if not joint.slides and joint.side in (None, side):
-                name = joint.coordinate
-                key = name if joint.side else f"{name}_{SUFFIX[side]}"
-                i = band.names.index(name)
-                curves = (band.lowest[:, i], band.mean[:, i], band.highest[:, i])
-                angles[key] = Band(_PERCENT, *curves)
-    return Reference(angles=angles)
 
 
 @dataclass(frozen=True)
@@ -121,11 +97,8 @@ def joint_angle_figure(trials: Sequence[Trial]) -> Figure:
     bands = _bands(trials, lambda trial: trial.motion)
     fig = new_figure(3.9)
     panels = fig.subplots(3, 2).ravel()
-    for ax, (joint, (title, label)) in zip(panels, _ANGLES.items(), strict=False):
-        factor = CLINICAL_ANGLE.get(joint, 1.0) * float(to_degrees(1.0))
-        pattern = f"{joint}_{{}}" if joint in CLINICAL_ANGLE else joint
-        _panel(ax, bands, pattern, factor, title, label)
-    legend_panel(panels[-1], _handles(bands, "hip_{}"))
+    _draw(panels, bands, _ANGLES)
+    legend_panel(panels[-1], _handles(bands, "hip_{}", "stride"))
     return fig
 
 
@@ -142,10 +115,8 @@ def joint_torque_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
     bands = _bands(trials, lambda trial: trial.tau, measured=True)
     fig = new_figure(2.9)
     panels = fig.subplots(2, 2).ravel()
-    for ax, (joint, title) in zip(panels, _TORQUES.items(), strict=False):
-        factor = EXTENSION[joint] / body_mass
-        _panel(ax, bands, f"{joint}_{{}}", factor, title, "net torque [N m/kg]")
-    legend_panel(panels[-1], _handles(bands, "hip_{}", measured=True))
+    _draw(panels, bands, _TORQUES, body_mass)
+    legend_panel(panels[-1], _handles(bands, "hip_{}", "measured stride"))
     return fig
 
 
@@ -158,9 +129,8 @@ def ground_force_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
     """
     bands = _bands(trials, lambda trial: trial.forces, measured=True)
     fig = new_figure(2.2)
-    for ax, (axis, (title, label)) in zip(fig.subplots(1, 2), _FORCES.items(), strict=True):
-        _panel(ax, bands, f"force_{{}}_{axis}", 100.0 / (body_mass * GRAVITY), title, label)
-    legend(fig, _handles(bands, "force_{}_z", measured=True))
+    _draw(fig.subplots(1, 2), bands, _FORCES, body_mass)
+    legend(fig, _handles(bands, "force_{}_z", "measured stride"))
     return fig
 
 
@@ -225,6 +195,35 @@ def save_recorded_figures(
     return tuple(names)
 
 
+def recorded_reference(patient: Patient, condition: Condition) -> Reference | None:
+    """Return recorded joint angles as bands to draw behind those of a prediction.
+
+    Args:
+        patient: The patient.
+        condition: Condition of the recordings beside the patient's file.
+
+    Returns:
+        The bands, or None without usable recordings, which a prediction does not need.
+    """
+    try:
+        names = recording_names(patient, condition)
+        recordings = [read_recording(patient, condition, name) for name in names]
+        trials = [(each.motion, gait_cycles(each.events)) for each in recordings]
+        bands = {side: cycle_band(trials, side) for side in SIDES}
+    except InputError:
+        return None
+    angles = {}
+    for side, band in bands.items():
+        for joint in PLANAR_WALKER.joints:
+            if not joint.slides and joint.side in (None, side):
+                name = joint.coordinate
+                key = name if joint.side else f"{name}_{SUFFIX[side]}"
+                i = band.names.index(name)
+                curves = (band.lowest[:, i], band.mean[:, i], band.highest[:, i])
+                angles[key] = Band(_PERCENT, *curves)
+    return Reference(angles=angles)
+
+
 def name_figure(figure: Figure, words: str) -> None:
     """Put words above its legend, so that a figure tells what it shows wherever it goes."""
     inside = [box for ax in figure.axes if (box := ax.get_legend())]
@@ -264,43 +263,40 @@ def _bands(
     return _Bands(sides, toe_off)
 
 
-def _panel(ax: Axes, bands: _Bands, pattern: str, factor: float, title: str, label: str) -> None:
-    """Draw mean and range of one quantity of both sides.
-
-    Args:
-        ax: The panel.
-        bands: The bands.
-        pattern: Column with "{}" for the side's suffix.
-        factor: From the column's unit and sign to the panel's.
-        title: Title of the panel.
-        label: Label of its y axis, with unit.
-    """
-    dress(ax, title, y=label)
-    zero_line(ax)
-    for side, band in bands.sides.items():
-        column = band.names.index(pattern.format(SUFFIX[side]))
-        count = band.count[:, column]
-        curves = (band.lowest, band.highest, band.mean)
-        # Where some cycles have no value, as at the strike of a stance that is not measured, the
-        # mean would jump to that of the others.
-        low, high, mean = (
-            np.where(count == count.max(), factor * curve[:, column], np.nan) for curve in curves
-        )
-        colour, style = LINE_COLOUR[side], LINE_STYLE[side]
-        ax.fill_between(_PERCENT, low, high, color=colour, alpha=0.18, linewidth=0)
-        for edge in (low, high):  # so that the ranges of both sides differ without colour too
-            ax.plot(_PERCENT, edge, color=colour, linestyle=style, linewidth=0.5, alpha=0.7)
-        ax.plot(_PERCENT, mean, color=colour, linestyle=style)
-        ax.axvline(bands.toe_off[side], linewidth=0.6, color=colour, linestyle=style)
-    percent_axis(ax)
+def _draw(axes: Iterable[Axes], bands: _Bands, panels: Panels, per: float = 1.0) -> None:
+    """Draw mean and range of some quantities of both sides, divided by `per`, a panel each."""
+    for ax, (pattern, (title, label, factor)) in zip(axes, panels.items(), strict=False):
+        dress(ax, title, y=label)
+        zero_line(ax)
+        for side in bands.sides:
+            _draw_side(ax, bands, side, pattern, factor / per)
+        percent_axis(ax)
 
 
-def _handles(bands: _Bands, pattern: str, measured: bool = False) -> list[Artist]:
+def _draw_side(ax: Axes, bands: _Bands, side: Side, pattern: str, factor: float) -> None:
+    """Draw mean and range of one quantity of one side, and when its foot leaves the ground."""
+    band = bands.sides[side]
+    column = band.names.index(pattern.format(SUFFIX[side]))
+    count = band.count[:, column]
+    # Where some cycles have no value, as at the strike of a stance that is not measured, the
+    # mean would jump to that of the others.
+    low, high, mean = (
+        np.where(count == count.max(), factor * curve[:, column], np.nan)
+        for curve in (band.lowest, band.highest, band.mean)
+    )
+    colour, style = LINE_COLOUR[side], LINE_STYLE[side]
+    ax.fill_between(_PERCENT, low, high, color=colour, alpha=0.18, linewidth=0)
+    for edge in (low, high):  # so that the ranges of both sides differ without colour too
+        ax.plot(_PERCENT, edge, color=colour, linestyle=style, linewidth=0.5, alpha=0.7)
+    ax.plot(_PERCENT, mean, color=colour, linestyle=style)
+    ax.axvline(bands.toe_off[side], linewidth=0.6, color=colour, linestyle=style)
+
+
+def _handles(bands: _Bands, pattern: str, thing: str) -> list[Artist]:
     """Return the legend: sides with their number of strides, the range, the toe-offs."""
     handles: list[Artist] = []
     for side, band in bands.sides.items():
         count = band.count[:, band.names.index(pattern.format(SUFFIX[side]))]
-        thing = "measured stride" if measured else "stride"
         label = f"{side}, mean of\n{_counted(int(count.max()), thing)}"
         style = LINE_STYLE[side]
         handles.append(Line2D([], [], color=LINE_COLOUR[side], linestyle=style, label=label))

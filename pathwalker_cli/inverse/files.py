@@ -27,7 +27,6 @@ __all__ = [
     "strengths_source",
     "write_dynamics",
     "write_kinematics",
-    "write_origin",
     "write_strengths_yaml",
     "write_trial",
 ]
@@ -61,30 +60,26 @@ def write_dynamics(
     trials: Sequence[Trial],
     tables: Sequence[ResidualTable],
     strengths: StrengthTable,
-    body_mass: float,
+    patient: Patient,
     method: str,
 ) -> None:
-    """Write what `write_kinematics` writes, and residuals, stances and strengths.
+    """Write what `write_kinematics` writes, residuals, stances, strengths, and whose they are.
 
     Args:
         folder: Where; it must exist.
         trials: The trials.
         tables: Their residuals.
         strengths: Strengths, written if there are any.
-        body_mass: Mass of the patient [kg].
-        method: Name of the method, for the head of `strengths.yaml`.
+        patient: The patient.
+        method: Name of the method.
     """
-    write_kinematics(folder, trials, body_mass)
+    write_kinematics(folder, trials, patient.body_mass)
     _write_residuals(folder / "residuals.csv", tables)
     _write_stances(folder / "stances.csv", trials)
     if strengths.strengths is not None:
         _write_strengths(folder / "strengths.csv", strengths)
         source = strengths_source(method)
         write_strengths_yaml(folder / "strengths.yaml", strengths.strengths, source)
-
-
-def write_origin(folder: Path, patient: Patient, method: str) -> None:
-    """Write whose gait was studied, by which method, when and with which versions."""
     content = {
         "patient": patient.id,
         "age": patient.age,

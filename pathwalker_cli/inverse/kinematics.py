@@ -120,9 +120,12 @@ class _Fit:
             frame.placement.act(np.array([point.position[0], 0.0, point.position[1]]))
             for frame, point in zip(frames, points, strict=True)
         ]
-        chains = [[index - 1 for index in model.supports[j] if index > 0] for j in self.joints]
-        self.moves = np.array([[c in chain for c in range(model.nv)] for chain in chains])
-        self.lower, self.curved = _lower_hinges(model)
+        count = range(model.nv)
+        carries = np.array([[c + 1 in list(model.supports[j + 1]) for c in count] for j in count])
+        hinges = np.array([name not in TRANSLATIONS for name in COORDINATES])
+        self.moves = carries[np.array(self.joints) - 1]
+        self.curved = (carries | carries.T) & np.outer(hinges, hinges)
+        self.lower = np.maximum.outer(count, count)
 
     def start(self, target: np.ndarray) -> np.ndarray:
         """Return the upright pose among the markers of a first frame."""
@@ -194,21 +197,6 @@ class _Fit:
             else:
                 damping = max(10.0 * damping, DAMPING)
         raise DataError("markers and walker do not fit", where=where, mend="check the markers")
-
-
-def _lower_hinges(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each pair of coordinates the lower hinge, and whether both turn one chain."""
-    count = model.nv
-    hinge = [name not in TRANSLATIONS for name in COORDINATES]
-    chains = [[index - 1 for index in model.supports[j + 1] if index > 0] for j in range(count)]
-    lower = np.maximum.outer(np.arange(count), np.arange(count))
-    curved = np.array(
-        [
-            [hinge[a] and hinge[b] and min(a, b) in chains[max(a, b)] for b in range(count)]
-            for a in range(count)
-        ]
-    )
-    return lower, curved
 
 
 def _downhill(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:

@@ -247,17 +247,6 @@ def _remark(peak: Peak, config: InverseDynamicsConfig) -> str:
     count, low, high = len(peak.single), min(peak.single), max(peak.single)
     if count < config.least_stances:
         remarks.append(f"only {count} stance{'s' if count > 1 else ''}")
-    changes = _changes(peak, config)
-    worst = max(changes, key=lambda name: abs(changes[name]))
-    if abs(changes[worst]) > config.largest_sensitivity:
-        remarks.append(f"ill-conditioned: {worst} changes it by {changes[worst]:+.0%}")
-    if high > 1.5 * low:
-        remarks.append(f"single stances give {low:.0f} to {high:.0f} N m")
-    return "; ".join(remarks)
-
-
-def _changes(peak: Peak, config: InverseDynamicsConfig) -> dict[str, float]:
-    """Return by which share of itself the strength changes with errors of angle and speed."""
     generator = next(g for g in generators() if g.name == peak.generator)
     changes = {}
     for sign in (1.0, -1.0):
@@ -265,4 +254,9 @@ def _changes(peak: Peak, config: InverseDynamicsConfig) -> dict[str, float]:
         for name, da, dv in ((f"{angle:+g} rad", angle, 0.0), (f"{speed:+g} rad/s", 0.0, speed)):
             value = isometric_torque(generator, peak.torque, peak.angle + da, peak.speed + dv)
             changes[name] = value / peak.strength - 1.0
-    return changes
+    worst = max(changes, key=lambda name: abs(changes[name]))
+    if abs(changes[worst]) > config.largest_sensitivity:
+        remarks.append(f"ill-conditioned: {worst} changes it by {changes[worst]:+.0%}")
+    if high > 1.5 * low:
+        remarks.append(f"single stances give {low:.0f} to {high:.0f} N m")
+    return "; ".join(remarks)

@@ -54,6 +54,7 @@ __all__ = [
     "dynamics_trials",
     "kinematics_trials",
     "read_trials",
+    "recorded_stances",
     "recorded_trials",
     "require_trials",
     "with_torques",
@@ -134,18 +135,16 @@ def _c3d_dynamics(
     files = c3d_files(config.c3d.of(condition))
     published = config.method == "published"
     for path in files:
-        if (config.trials and path.stem not in config.trials) or (
-            published and path.stem not in AVERAGED_TRIALS[condition]
-        ):
+        wanted = not config.trials or path.stem in config.trials
+        if not wanted or (published and path.stem not in AVERAGED_TRIALS[condition]):
             continue
         progress(f"{condition} {path.stem}")
         trial, recording = c3d_trial(path, patient, condition, config)
         require_plates(recording, path)
-        trials.append(
-            _published(trial, recording, patient)
-            if published
-            else with_torques(trial, patient, config.motion_cutoff)
-        )
+        if published:
+            trials.append(_published(trial, recording, patient))
+        else:
+            trials.append(with_torques(trial, patient, config.motion_cutoff))
     if files and not trials and published:
         raise DataError(
             f"none of the {len(files)} {condition} files is a trial of the published tables",
@@ -204,7 +203,7 @@ def recorded_trials(
         if not config.trials or name in config.trials:
             progress(f"{condition} {name}")
             recording = read_recording(patient, condition, name)
-            trial = _trial(recording, condition, stances=_stances(recording))
+            trial = _trial(recording, condition, stances=recorded_stances(recording))
             trials.append(with_torques(trial, patient, config.motion_cutoff))
     return trials
 
@@ -280,13 +279,12 @@ def with_torques(trial: Trial, patient: Patient, cutoff: float = MOTION_CUTOFF) 
 def _published(trial: Trial, recording: Recording, patient: Patient) -> Trial:
     """Return a trial with cycles, forces and torques of the published method."""
     model = pinocchio_model(patient, trial.condition, published=True)
-    tau, forces = published_torques(model, recording, trial.motion.values)
-    tau_table = generalised_forces(trial.motion.time, tau)
-    cycles = flagged_cycles(recording)
-    return replace(trial, cycles=cycles, forces=forces, tau=tau_table, published=True)
+    values, forces = published_torques(model, recording, trial.motion.values)
+    tau, cycles = generalised_forces(trial.motion.time, values), flagged_cycles(recording)
+    return replace(trial, cycles=cycles, forces=forces, tau=tau, published=True)
 
 
-def _stances(recording: CompactRecording) -> tuple[StanceForce, ...]:
+def recorded_stances(recording: CompactRecording) -> tuple[StanceForce, ...]:
     """Return which stances of a compact recording are measured: their forces are all there."""
     judged = []
     for stance in stances(recording.events):

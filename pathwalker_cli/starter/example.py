@@ -17,11 +17,12 @@ import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
 from pathwalker_cli.conventions import SIDES, Condition
-from pathwalker_cli.inverse.cycles import Stance, stances
+from pathwalker_cli.inverse.cycles import Stance
 from pathwalker_cli.inverse.dynamics import frame_rate
 from pathwalker_cli.inverse.forces import foot_extents, foot_points, plate_channels
 from pathwalker_cli.inverse.kinematics import marker_paths
 from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set, marker_points
+from pathwalker_cli.inverse.trials import recorded_stances
 from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
 from pathwalker_cli.io.c3d_write import write_c3d
 from pathwalker_cli.io.recordings import CompactRecording, read_recording, recording_names
@@ -103,14 +104,7 @@ def made_recordings(patient: Patient, condition: Condition) -> Iterator[Recordin
 
 def _measured(trial: CompactRecording) -> list[Stance]:
     """Return the stances of a trial of which the forces are known."""
-    forces = trial.forces
-    if forces is None:
-        return []
-    return [
-        stance
-        for stance in stances(trial.events)
-        if np.isfinite(forces[f"force_{stance.side[0]}_z"][stance.strike : stance.toe_off]).all()
-    ]
+    return [item.stance for item in recorded_stances(trial) if item.measured]
 
 
 @dataclass(frozen=True)
