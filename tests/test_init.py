@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
-from pathwalker_cli.inverse.forces import plate_channels, plate_load
+from pathwalker_cli.inverse.forces import plate_load
 from pathwalker_cli.inverse.recorded import with_block
 from pathwalker_cli.inverse.study import (
     RecordedConfig,
@@ -250,7 +250,7 @@ def test_channels_of_a_plate_give_back_force_and_point() -> None:
     point = np.array([[0.05, -0.02], [-0.1, 0.03]])
     size = (0.2, 0.06, 0.03)
     corners = np.array([[0.25, 0.1, 0.0], [-0.25, 0.1, 0.0], [-0.25, -0.1, 0.0], [0.25, -0.1, 0.0]])
-    plate = ForcePlate("plate 1", corners, *size, plate_channels(force, point, *size))
+    plate = ForcePlate("plate 1", corners, *size, example.plate_channels(force, point, *size))
     load = plate_load(plate)
     assert load.force == pytest.approx(force)
     fx, fy, fz = load.force.T

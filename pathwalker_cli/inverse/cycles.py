@@ -187,21 +187,21 @@ class CycleBand:
 
     Args:
         names: Column names, m of them.
-        units: Their units.
         mean: Mean, shape (POINTS, m); NaN where no cycle has a value.
         deviation: Standard deviation between cycles, shape (POINTS, m).
         lowest: Smallest value, shape (POINTS, m).
         highest: Largest value, shape (POINTS, m).
         count: Number of cycles that have a value, shape (POINTS, m).
+        toe_off: Mean position of the toe-off [%].
     """
 
     names: tuple[str, ...]
-    units: tuple[str, ...]
     mean: np.ndarray
     deviation: np.ndarray
     lowest: np.ndarray
     highest: np.ndarray
     count: np.ndarray
+    toe_off: float
 
 
 def resampled(columns: np.ndarray) -> np.ndarray:
@@ -220,15 +220,11 @@ def cycle_band(trials: Sequence[tuple[Trajectory, tuple[GaitCycle, ...]]], side:
     Raises:
         DataError: If the trials show no complete cycle of that side.
     """
-    curves = [
-        resampled(curve.values[cycle.rows])
-        for curve, cycles in trials
-        for cycle in cycles
-        if cycle.side == side
-    ]
-    if not curves:
+    own = [(curve, c) for curve, cycles in trials for c in cycles if c.side == side]
+    if not own:
         raise DataError(f"the trials show no complete gait cycle of the {side} side")
-    stacked = np.array(curves)
+    stacked = np.array([resampled(curve.values[cycle.rows]) for curve, cycle in own])
+    toe_off = 100.0 * float(np.mean([(c.toe_off - c.start) / (c.end - c.start) for _, c in own]))
     known = np.isfinite(stacked)
     count = known.sum(axis=0)
     with np.errstate(invalid="ignore"):
@@ -237,5 +233,5 @@ def cycle_band(trials: Sequence[tuple[Trajectory, tuple[GaitCycle, ...]]], side:
     lowest = np.where(known, stacked, np.inf).min(axis=0)
     highest = np.where(known, stacked, -np.inf).max(axis=0)
     lowest[count == 0] = highest[count == 0] = np.nan
-    first = trials[0][0]
-    return CycleBand(first.names, first.units, mean, np.sqrt(square), lowest, highest, count)
+    names = trials[0][0].names
+    return CycleBand(names, mean, np.sqrt(square), lowest, highest, count, toe_off)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -78,12 +77,8 @@ _FORCES: Final[Panels] = {
 }
 
 
-@dataclass(frozen=True)
-class _Bands:
-    """Bands of both sides and when their feet leave the ground [%]."""
-
-    sides: Mapping[Side, CycleBand]
-    toe_off: Mapping[Side, float]
+Bands = Mapping[Side, CycleBand]
+"""Bands of the sides that show a gait cycle."""
 
 
 def joint_angle_figure(trials: Sequence[Trial]) -> Figure:
@@ -236,7 +231,7 @@ def _bands(
     trials: Sequence[Trial],
     columns: Callable[[Trial], Trajectory | None],
     measured: bool = False,
-) -> _Bands:
+) -> Bands:
     """Return the bands of the sides of which the trials show a complete gait cycle.
 
     Args:
@@ -250,32 +245,24 @@ def _bands(
         if table is not None:
             cycles = tuple(c for c in trial.cycles if not measured or trial.measured(c))
             curves.append((table, cycles))
-    sides: dict[Side, CycleBand] = {}
-    toe_off: dict[Side, float] = {}
-    for side in SIDES:
-        own = [cycle for _, cycles in curves for cycle in cycles if cycle.side == side]
-        if own:
-            sides[side] = cycle_band(curves, side)
-            share = [(cycle.toe_off - cycle.start) / (cycle.end - cycle.start) for cycle in own]
-            toe_off[side] = 100.0 * float(np.mean(share))
-    if not sides:
+    seen = {cycle.side for _, cycles in curves for cycle in cycles}
+    if not seen:
         raise DataError("the trials show no complete gait cycle")
-    return _Bands(sides, toe_off)
+    return {side: cycle_band(curves, side) for side in SIDES if side in seen}
 
 
-def _draw(axes: Iterable[Axes], bands: _Bands, panels: Panels, per: float = 1.0) -> None:
+def _draw(axes: Iterable[Axes], bands: Bands, panels: Panels, per: float = 1.0) -> None:
     """Draw mean and range of some quantities of both sides, divided by `per`, a panel each."""
     for ax, (pattern, (title, label, factor)) in zip(axes, panels.items(), strict=False):
         dress(ax, title, y=label)
         zero_line(ax)
-        for side in bands.sides:
-            _draw_side(ax, bands, side, pattern, factor / per)
+        for side, band in bands.items():
+            _draw_side(ax, side, band, pattern, factor / per)
         percent_axis(ax)
 
 
-def _draw_side(ax: Axes, bands: _Bands, side: Side, pattern: str, factor: float) -> None:
+def _draw_side(ax: Axes, side: Side, band: CycleBand, pattern: str, factor: float) -> None:
     """Draw mean and range of one quantity of one side, and when its foot leaves the ground."""
-    band = bands.sides[side]
     column = band.names.index(pattern.format(SUFFIX[side]))
     count = band.count[:, column]
     # Where some cycles have no value, as at the strike of a stance that is not measured, the
@@ -289,13 +276,13 @@ def _draw_side(ax: Axes, bands: _Bands, side: Side, pattern: str, factor: float)
     for edge in (low, high):  # so that the ranges of both sides differ without colour too
         ax.plot(_PERCENT, edge, color=colour, linestyle=style, linewidth=0.5, alpha=0.7)
     ax.plot(_PERCENT, mean, color=colour, linestyle=style)
-    ax.axvline(bands.toe_off[side], linewidth=0.6, color=colour, linestyle=style)
+    ax.axvline(band.toe_off, linewidth=0.6, color=colour, linestyle=style)
 
 
-def _handles(bands: _Bands, pattern: str, thing: str) -> list[Artist]:
+def _handles(bands: Bands, pattern: str, thing: str) -> list[Artist]:
     """Return the legend: sides with their number of strides, the range, the toe-offs."""
     handles: list[Artist] = []
-    for side, band in bands.sides.items():
+    for side, band in bands.items():
         count = band.count[:, band.names.index(pattern.format(SUFFIX[side]))]
         label = f"{side}, mean of\n{_counted(int(count.max()), thing)}"
         style = LINE_STYLE[side]

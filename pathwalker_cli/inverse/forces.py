@@ -38,7 +38,6 @@ __all__ = [
     "foot_points",
     "force_columns",
     "ground_forces",
-    "plate_channels",
     "plate_direction",
     "plate_load",
 ]
@@ -85,29 +84,6 @@ def plate_load(plate: ForcePlate, channels: np.ndarray | None = None) -> PlateLo
     )
     axes = _axes(plate.corners)
     return PlateLoad(force @ axes, moment @ axes, plate.corners.mean(axis=0), plate.depth)
-
-
-def plate_channels(
-    force: np.ndarray, point: np.ndarray, half_length: float, half_width: float, depth: float
-) -> np.ndarray:
-    """Return the channels of a plate that carries a force at a point; the inverse of `plate_load`.
-
-    Args:
-        force: Force on the body in the plate's axes [N], shape (samples, 3).
-        point: Where it acts on the surface, from the centre along the plate's x and y [m],
-            shape (samples, 2).
-        half_length: Distance of the sensors from the centre along x [m].
-        half_width: Distance of the sensors from the centre along y [m].
-        depth: Depth of the sensors below the surface [m].
-
-    Returns:
-        x12, x34, y14, y23, z1, z2, z3, z4 [N], shape (samples, 8), without moment about z.
-    """
-    fx, fy, fz = force.T
-    x, y = point.T
-    across, along = (y * fz + depth * fy) / half_width, -(x * fz + depth * fx) / half_length
-    corners = [fz + across - along, fz + across + along, fz - across + along, fz - across - along]
-    return np.stack([fx / 2, fx / 2, fy / 2, fy / 2, *(z / 4 for z in corners)], axis=1)
 
 
 def _axes(corners: np.ndarray) -> np.ndarray:
@@ -174,7 +150,7 @@ def ground_forces(
         recording: The recording.
         model: The walker, for the extents of its feet and its weight.
         motion: Its coordinates in every frame, from `inverse_kinematics`.
-        plane: How the walking direction lies in the plates' laboratory axes; found from where the
+        plane: How the walking direction lies in the plates' laboratory axes; that in which the
             loads lie under the feet if left out.
         cutoff: Cut-off frequency of the plate channels [Hz].
 

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from pathwalker_cli.conventions import SIDES, Condition
 from pathwalker_cli.inverse.cycles import Stance
 from pathwalker_cli.inverse.dynamics import frame_rate
-from pathwalker_cli.inverse.forces import foot_extents, foot_points, plate_channels
+from pathwalker_cli.inverse.forces import foot_extents, foot_points
 from pathwalker_cli.inverse.kinematics import marker_paths
 from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set, marker_points
 from pathwalker_cli.inverse.trials import recorded_stances
@@ -29,7 +29,7 @@ from pathwalker_cli.io.recordings import CompactRecording, read_recording, recor
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient, load_patient
 
-__all__ = ["made_recordings", "write_example"]
+__all__ = ["made_recordings", "plate_channels", "write_example"]
 
 SOURCE: Final = "sreenivasa2017-patient"
 """Whose recordings are played."""
@@ -182,6 +182,29 @@ def _plate(number: int, stance: Stance, played: _Played, child: _Body, other: _B
     at = np.arange(len(force) * _PER_FRAME) / _PER_FRAME
     samples = np.column_stack([np.interp(at, np.arange(len(force)), c) for c in channels.T])
     return ForcePlate(f"plate {number}", corners, *_SENSORS, samples)
+
+
+def plate_channels(
+    force: np.ndarray, point: np.ndarray, half_length: float, half_width: float, depth: float
+) -> np.ndarray:
+    """Return the channels of a plate that carries a force at a point: `plate_load` turned round.
+
+    Args:
+        force: Force on the body in the plate's axes [N], shape (samples, 3).
+        point: Where it acts on the surface, from the centre along the plate's x and y [m],
+            shape (samples, 2).
+        half_length: Distance of the sensors from the centre along x [m].
+        half_width: Distance of the sensors from the centre along y [m].
+        depth: Depth of the sensors below the surface [m].
+
+    Returns:
+        x12, x34, y14, y23, z1, z2, z3, z4 [N], shape (samples, 8), without moment about z.
+    """
+    fx, fy, fz = force.T
+    x, y = point.T
+    across, along = (y * fz + depth * fy) / half_width, -(x * fz + depth * fx) / half_length
+    corners = [fz + across - along, fz + across + along, fz - across + along, fz - across - along]
+    return np.stack([fx / 2, fx / 2, fy / 2, fy / 2, *(z / 4 for z in corners)], axis=1)
 
 
 def _load(
