@@ -729,21 +729,21 @@ def test_kinds_of_pages_do_not_mix(runs: Path, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study of four recorded trials."""
-    from pathwalker_cli.inverse import recorded_study
-    from pathwalker_cli.inverse.evaluate import dynamics_trials
-    from pathwalker_cli.inverse.study_tables import residual_tables, strength_table
+    from pathwalker_cli.inverse import files
+    from pathwalker_cli.inverse.residuals import residual_tables
+    from pathwalker_cli.inverse.strengths import strength_table
+    from pathwalker_cli.inverse.trials import dynamics_trials
 
     folder = tmp_path_factory.mktemp("recorded")
     study = load_inverse_dynamics("inverse-dynamics", ("conditions=[barefoot]",))
     patient = load_patient(study.patient)
     trials = dynamics_trials(study, patient, lambda _: None)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(recorded_study, "save_recorded_figures", lambda *_: ())
-        recorded_study.write_dynamics(
+        patch.setattr(files, "save_recorded_figures", lambda *_: ())
+        files.write_dynamics(
             folder, trials, residual_tables(trials, patient, study),
-            strength_table(trials, patient, study), patient.body_mass, study.method,
+            strength_table(trials, patient, study), patient, study.method,
         )  # fmt: skip
-        recorded_study.write_origin(folder, patient, study.method)
     return folder
 
 
