@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -134,12 +135,15 @@ EVENTS: Final[dict[str, bytes]] = {
 """Events of a recording of 30 frames that cannot be used."""
 
 
-def archive(**members: bytes) -> bytes:
-    """Return a compressed archive with these members."""
+def archive(zeros: int = 0, **members: bytes) -> bytes:
+    """Return a compressed archive with these members, the first with millions of zeros more."""
     file = io.BytesIO()
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as made:
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as made:
         for name, content in members.items():
-            made.writestr(name.replace("__", "."), content)
+            with made.open(name.replace("__", "."), "w", force_zip64=True) as member:
+                member.write(content)
+                for _ in range(zeros):  # in parts: the memory of this process is measured
+                    member.write(bytes(1_000_000))
     return file.getvalue()
 
 
@@ -156,7 +160,7 @@ def _claimed(shape: str) -> bytes:
     return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode()
 
 
-ARCHIVES: Final[dict[str, bytes]] = {
+ARCHIVES: Final[dict[str, bytes | Callable[[], bytes]]] = {
     "empty": b"",
     "text": b"a motion, but in words",
     "empty archive": archive(),
@@ -169,9 +173,9 @@ ARCHIVES: Final[dict[str, bytes]] = {
     "shape beyond whole numbers": archive(unknowns__npy=_claimed("(10**9, 10**9, 10**9)")),
     "negative shape": archive(unknowns__npy=_claimed("(-5,)")),
     "header that calls": archive(unknowns__npy=_claimed("(__import__('os').getpid(),)")),
-    "600 MB of zeros": archive(unknowns__npy=_claimed("(75000000,)") + bytes(600_000_000)),
+    "600 MB of zeros": lambda: archive(600, unknowns__npy=_claimed("(75000000,)")),
 }
-"""Archives that hold neither a motion nor multipliers."""
+"""Archives that hold neither a motion nor multipliers, or what takes its time to make one."""
 
 JSON: Final[dict[str, bytes]] = {
     "empty": b"",

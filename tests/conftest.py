@@ -6,6 +6,8 @@ import os
 import socket
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from io import StringIO
+from pathlib import Path
 from typing import Any
 
 os.environ["MPLBACKEND"] = "Agg"
@@ -24,6 +26,8 @@ from pathwalker_cli.gait.solution import GaitSolution, StageRecord
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
 from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.verify import Reintegration
 
 _LENGTHS = {"short": 15, "long": 3000}
@@ -85,6 +89,36 @@ def _legible_figures() -> Iterator[None]:
         yield
 
 
+_EMPTY = {
+    "png": b"\x89PNG\r\n\x1a\n",
+    "svg": b'<svg xmlns="http://www.w3.org/2000/svg" width="1" height="1" version="1.1"></svg>',
+}
+
+
+def sketch(patch: pytest.MonkeyPatch) -> None:
+    """Lay figures out and judge their texts, but save them empty: drawing is what takes long."""
+    judged: list[Figure] = []
+
+    def save(self: Figure, file: Any, *, format: str, **_: Any) -> None:
+        if self not in judged:  # its layout is settled when it is saved first
+            found = complaints(self)
+            assert not found, found
+            judged.append(self)
+        if isinstance(file, StringIO):
+            file.write(_EMPTY[format].decode())
+        else:
+            Path(file).write_bytes(_EMPTY[format])
+
+    patch.setattr(Figure, "savefig", save)
+
+
+@pytest.fixture
+def sketched(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only sketch figures, but in tests that are marked `drawn`."""
+    if not request.node.get_closest_marker("drawn"):
+        sketch(monkeypatch)
+
+
 def made_result() -> NlpResult:
     """Return the end of a nonlinear program of two unknowns and one row."""
     two, one = np.array([0.1, -0.2]), np.array([0.5])
@@ -94,6 +128,16 @@ def made_result() -> NlpResult:
 @pytest.fixture(scope="session")
 def made_solution() -> MadeSolution:
     """Return a function that makes the end of a solve out of the stylised gait."""
+    known: dict[str, dict[str, Any]] = {}
+
+    def series_of(solution: GaitSolution) -> dict[str, Any]:
+        """Return what follows from motion and walker alone, once for all ends of a problem."""
+        condition = solution.walker.condition
+        if condition not in known:
+            known[condition] = {
+                "last_iterate": solution.last_iterate, "second_engine": solution.second_engine,
+            }  # fmt: skip
+        return known[condition]
 
     def make(problem: str = "mapd-orthosis", **changes: Any) -> GaitSolution:
         case = changes.get("case") or Case.of(changes.pop("config", None) or load_config(problem))
@@ -119,6 +163,20 @@ def made_solution() -> MadeSolution:
             stages=(StageRecord("fine", "converged", 32, 5000, 42, 1.5, 0.5),),
             seconds={"build": 1.0, "solve": 1.5, "verify": 0.2},
         )
-        return replace(solution, **changes)
+        changed = replace(solution, **changes)
+        if changed.last_motion is solution.last_motion and changed.walker is walker:
+            changed.__dict__.update(series_of(solution))
+        return changed
 
     return make
+
+
+@pytest.fixture(scope="session")
+def made_runs(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a barefoot run and one with orthoses, to be read or copied."""
+    folder = tmp_path_factory.mktemp("made")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_folder, "save_figures", lambda *_: ())
+        for problem in ("mapd-barefoot", "mapd-orthosis"):
+            write_run(folder / problem, made_solution(problem))
+    return folder

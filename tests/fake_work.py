@@ -25,7 +25,7 @@ def fake_work(case: Case, folder: str, warm_start: str) -> Result:
     if kind == "fails":
         raise ZeroDivisionError("a bug")
     if kind == "hangs":
-        time.sleep(600)
+        time.sleep(3600)
     metrics = {
         "status": "the iteration limit was reached" if kind == "is_hard" else "converged",
         "cost": case.config.bounds.friction / 3,

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from subprocess import CompletedProcess
+from tempfile import TemporaryFile
 
 import numpy as np
 
+from pathwalker_cli.cli import main
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, Condition
 from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.gait.stylised import StylisedGait, stylised_trajectory
@@ -22,6 +31,51 @@ FRICTION = 0.1
 INTERVALS, DEGREE = 4, 3
 STIFFNESS = np.array([50.0, 60.0, 10.0, 20.0])
 GAIT = StylisedGait(walking_speed=0.6, stride_length=0.66)
+GUARD = 600
+"""Time after which what is waited for will never happen [s]."""
+
+
+def called_apart(
+    folder: Path, *words: str, prepare: Callable[[], None] = lambda: None
+) -> CompletedProcess[str]:
+    """Run the command line in a process of its own that need not import anything again.
+
+    Args:
+        folder: Where.
+        words: What follows `pathwalker`.
+        prepare: What that process does first.
+    """
+    with TemporaryFile() as out, TemporaryFile() as err:
+        child = os.fork()
+        if child == 0:
+            try:
+                signal.alarm(GUARD)
+                os.chdir(folder)
+                os.dup2(out.fileno(), 1)
+                os.dup2(err.fileno(), 2)
+                sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")
+                os._exit(_called(words, prepare))
+            finally:
+                os._exit(1)
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        out.seek(0), err.seek(0)
+        return CompletedProcess(words, code, out.read().decode(), err.read().decode())
+
+
+def _called(words: tuple[str, ...], prepare: Callable[[], None]) -> int:
+    """Return the exit code that the interpreter would end with."""
+    sys.argv = ["pathwalker", *words]
+    try:
+        prepare()
+        main()
+        code = 0
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    sys.stdout.flush(), sys.stderr.flush()
+    return code
 
 
 @cache

@@ -20,6 +20,8 @@ HOSTILE = "</script><img src=x onerror=alert(1)>"
 CORNERS = """() => [...document.querySelectorAll(".shape")].map((shape) =>
   shape.getAttribute("d").match(/-?[0-9.]+/g).map(Number)).flat()"""
 """All numbers of all shapes, forward and up in turn [m]."""
+GUARD = 120_000
+"""Time after which what is waited for will never happen [ms]."""
 
 pytestmark = [
     pytest.mark.skipif(BROWSER is None, reason="neither chromium nor google-chrome is on PATH"),
@@ -54,7 +56,7 @@ class Opened:
         self.page = browser.new_page(
             viewport={"width": width, "height": 900}, reduced_motion=motion
         )
-        self.page.set_default_timeout(10_000)
+        self.page.set_default_timeout(GUARD)
         self.troubles: list[str] = []
         self.page.on("pageerror", lambda error: self.troubles.append(str(error)))
         self.page.on("console", lambda message: self.troubles.append(message.text))
@@ -90,6 +92,11 @@ class Opened:
         """Press keys, wherever the focus is."""
         for key in keys:
             self.page.keyboard.press(key)
+
+    def stop_clock(self) -> None:
+        """Let time pass in the page only when a test says so, however slow the machine is."""
+        self.page.clock.install(time=0)
+        self.page.clock.pause_at(1000)
 
     def wait_beyond(self, percent: float) -> None:
         """Wait until the walker is beyond a position in the cycle."""
@@ -131,21 +138,24 @@ def test_the_end_of_the_cycle_is_its_beginning_one_stride_on(opened: Opened) -> 
 
 
 def test_less_motion_is_wanted_so_it_starts_paused(opened: Opened) -> None:
+    opened.stop_clock()
     assert opened.page.locator("#play").inner_text() == "Play"
-    opened.page.wait_for_timeout(200)
+    opened.page.clock.run_for(200)
     assert opened.percent() == 0
 
 
 def test_the_button_plays_and_pauses(opened: Opened) -> None:
+    opened.stop_clock()
     before = opened.corners()
     opened.page.locator("#play").click()
     assert opened.page.locator("#play").inner_text() == "Pause"
-    opened.wait_beyond(10)
+    opened.page.clock.run_for(200)
+    assert opened.percent() > 10
     opened.page.locator("#play").click()
     assert opened.page.locator("#play").inner_text() == "Play"
     paused = opened.corners()
     assert np.abs(paused - before).max() > 0.03
-    opened.page.wait_for_timeout(200)
+    opened.page.clock.run_for(200)
     assert (opened.corners() == paused).all()
 
 
@@ -181,8 +191,7 @@ def test_keys(opened: Opened) -> None:
 
 
 def test_a_quarter_of_the_speed_is_a_quarter_of_the_way(opened: Opened) -> None:
-    opened.page.clock.install(time=0)
-    opened.page.clock.pause_at(1000)
+    opened.stop_clock()
     shares = []
     for speed in ("1", "0.25"):
         opened.press("Home")

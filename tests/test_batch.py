@@ -22,6 +22,7 @@ from rich.console import Console
 
 from conftest import MadeSolution
 from fake_work import die, fake_work
+from helpers import GUARD
 from pathwalker_cli.case import Case, load_case
 from pathwalker_cli.cli import cli
 from pathwalker_cli.commands.progress import BatchProgress
@@ -465,7 +466,7 @@ def table_of(folder: Path) -> dict[str, dict[str, str]]:
 def test_a_worker_that_dies_loses_only_its_own_case(tmp_path: Path) -> None:
     cases = kinds(tmp_path, "is_fine", "dies_once", "dies", "fails", "is_hard", "hangs", "is_good")
     folder = tmp_path / "out"
-    report = run_batch(cases, folder, LocalPool(2, time_limit=1.5), Watch(), fake_work)
+    report = run_batch(cases, folder, LocalPool(2, time_limit=8.0), Watch(), fake_work)
     rows = table_of(folder)
     assert {name: row["status"] for name, row in rows.items()} == {
         "is_fine": "converged",
@@ -473,7 +474,7 @@ def test_a_worker_that_dies_loses_only_its_own_case(tmp_path: Path) -> None:
         "dies": "failed: its worker died every time it was tried",
         "fails": "failed: ZeroDivisionError: a bug",
         "is_hard": "the iteration limit was reached",
-        "hangs": "failed: took longer than the time limit of 1.5 s",
+        "hangs": "failed: took longer than the time limit of 8 s",
         "is_good": "converged",
     }
     assert rows["dies_once"]["cost"] == "0.17"
@@ -627,7 +628,7 @@ def test_two_processes_in_one_folder_are_refused(tmp_path: Path) -> None:
         "import sys, time\nfrom pathlib import Path\n"
         "from pathwalker_cli.io.lock import locked\n"
         "with locked(Path(sys.argv[1]) / '.lock', Path()):\n"
-        "    print('held', flush=True)\n    time.sleep(60)\n"
+        f"    print('held', flush=True)\n    time.sleep({2 * GUARD})\n"
     )
     command = [sys.executable, "-c", script, str(tmp_path / "out")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as other:
@@ -680,7 +681,7 @@ def test_workers_end_with_their_parent(tmp_path: Path, number: signal.Signals) -
                 os.killpg(parent.pid, number)
             else:
                 parent.send_signal(number)
-            output, _ = parent.communicate(timeout=20)
+            output, _ = parent.communicate(timeout=GUARD)
         except BaseException:
             os.killpg(parent.pid, signal.SIGKILL)
             raise
@@ -697,7 +698,7 @@ def busy(parent: int) -> list[int]:
     return ready if len(ready) == 2 else []
 
 
-def awaited(condition: Callable[[], Any], seconds: float = 20.0) -> Any:
+def awaited(condition: Callable[[], Any], seconds: float = GUARD) -> Any:
     """Return what a condition gives as soon as it is true."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:

@@ -21,6 +21,7 @@ import pytest
 from click.testing import CliRunner
 
 from conftest import MadeSolution, made_result
+from helpers import GUARD
 from kills import whole
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
@@ -31,8 +32,8 @@ from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.nlp import tape_store
 from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.metrics import run_inputs
 from pathwalker_cli.results.run_folder import claimed_run, load_run, release_runs, write_run
-from pathwalker_cli.results.run_metrics import run_inputs
 from pathwalker_cli.studies import journal
 from pathwalker_cli.studies import run as studies_run
 from pathwalker_cli.studies.base import claimed_folder
@@ -180,7 +181,7 @@ def other(tmp_path: Path) -> Iterator[Callable[[Path], subprocess.Popen[str]]]:
     )
     begun: list[subprocess.Popen[str]] = []
 
-    def hold(file: Path, seconds: float = 60.0) -> subprocess.Popen[str]:
+    def hold(file: Path, seconds: float = 2.0 * GUARD) -> subprocess.Popen[str]:
         process = subprocess.Popen(
             [sys.executable, "-c", script, file, str(seconds)], stdout=subprocess.PIPE, text=True
         )
@@ -215,7 +216,7 @@ def test_a_worker_waits_for_another_one(
 ) -> None:
     first = other(tmp_path / ".run.lock", 1.0)
     with claimed_run(tmp_path / "run", wait=True):
-        assert first.wait(5.0) == 0
+        assert first.wait(GUARD) == 0
     assert not left_over(tmp_path)
 
 
@@ -481,17 +482,17 @@ def pool(folder: Path, *seconds: float) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize("delay", [0.1, 0.5, 2.0])
 def test_ctrl_c_at_any_time_ends_all_workers_in_one_line(tmp_path: Path, delay: float) -> None:
-    with pool(tmp_path, 60, 60, 60) as process:
+    with pool(tmp_path, *[2.0 * GUARD] * 3) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "begun\n"
         time.sleep(delay)
         os.killpg(process.pid, signal.SIGINT)
-        output, _ = process.communicate(timeout=20)
+        output, _ = process.communicate(timeout=GUARD)
     assert output == "stopped\n"
 
 
 def test_a_worker_that_is_lost_is_told(tmp_path: Path) -> None:
-    with pool(tmp_path, 0, -1, 60) as process:
-        output, _ = process.communicate(timeout=30)
+    with pool(tmp_path, 0, -1, 2.0 * GUARD) as process:
+        output, _ = process.communicate(timeout=GUARD)
     assert output.startswith("begun\na process was ended from outside (out of memory?)")
     assert output.count("\n") == 2

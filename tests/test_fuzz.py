@@ -39,8 +39,7 @@ from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.nlp import tape_store
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results.motion_file import read_motion, write_motion
-from pathwalker_cli.results.multipliers_file import read_multipliers
+from pathwalker_cli.results.motion_file import read_motion, read_multipliers, write_motion
 from pathwalker_cli.studies.batch.schema import load_batch
 
 Read = Callable[[Path], Any]
@@ -245,7 +244,7 @@ def test_c3d_files_with_some_bytes_changed(seed: int) -> None:
     if not rng.randrange(5):
         del data[rng.randrange(len(data)) :]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(c3d, "_LONGEST", 5.0)
+        patch.setattr(c3d, "_LONGEST", 2.0)
         tried(lambda path: checked_recording(path, ("LASI", "RTOE"), 1.0), "made.c3d", bytes(data))
 
 

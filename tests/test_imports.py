@@ -59,9 +59,8 @@ CONFINED = {
     "matplotlib": (
         "animation.film",
         "stride.figures",
-        "inverse.recorded_figures",
-        "evaluation.ankle_panels",
-        "evaluation.cycle_curves",
+        "inverse.figures",
+        "evaluation.curves",
         "evaluation.figures",
         "report.figures",
         "reproduce.figures",
@@ -83,6 +82,7 @@ CONFINED = {
 """Libraries and the parts of the package that may import them."""
 
 
+@cache
 def modules() -> dict[str, Path]:
     """Return every module by its name below the package."""
     found = {}

@@ -21,7 +21,8 @@ from pathwalker_cli.commands.studies import StudyCall
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.results.run_folder import write_run
-from pathwalker_cli.studies import neighbours, unknowns
+from pathwalker_cli.studies import landscape as module
+from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies.base import Work, load_study
 from pathwalker_cli.studies.landscape import (
     STUDY,
@@ -37,6 +38,8 @@ from pathwalker_cli.studies.landscape.figures import landscape_figure
 from pathwalker_cli.studies.landscape.result import Landscape, region_of
 from pathwalker_cli.studies.landscape.text import landscape_lines, write_tables
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 COARSE = ("dorsiflexion.points=4", "plantarflexion=[5, 20, 80]")
 
 Make = Callable[..., tuple[Landscape, MadeResolver]]
@@ -45,7 +48,7 @@ Make = Callable[..., tuple[Landscape, MadeResolver]]
 @pytest.fixture
 def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
     """Return a function that computes a landscape without a solve."""
-    monkeypatch.setattr(unknowns, "measures", made_measures)
+    monkeypatch.setattr(module, "measures", made_measures)
 
     def make(
         changes: tuple[str, ...] = COARSE,
@@ -232,6 +235,7 @@ def test_barefoot_has_no_landscape() -> None:
 # Files, figure, words
 
 
+@pytest.mark.drawn
 def test_files(made: Make, tmp_path: Path) -> None:
     landscape, _ = made(leaps=True)
     STUDY.write(landscape, made_folder(tmp_path / "out"))

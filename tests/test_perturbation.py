@@ -24,27 +24,16 @@ from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.results import run_folder
-from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies import perturbation as module
-from pathwalker_cli.studies import unknowns
 from pathwalker_cli.studies.base import Work, base_run, load_study, require_optimum
 from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.neighbours import Journal
 from pathwalker_cli.studies.perturbation import PerturbationStudy, perturb
 from pathwalker_cli.studies.perturbation.result import perturbation_lines, remark
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 MadeSolution = Callable[..., GaitSolution]
-
-
-@pytest.fixture(scope="module")
-def runs(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a run with orthoses and a barefoot one."""
-    folder = tmp_path_factory.mktemp("runs")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
-        for problem in ("mapd-orthosis", "mapd-barefoot"):
-            write_run(folder / problem, made_solution(problem))
-    return folder
 
 
 @pytest.fixture
@@ -52,16 +41,16 @@ def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
     """Let a stand-in solve all neighbours."""
     stand_in = StandInResolver(load_case("mapd-orthosis"))
     monkeypatch.setattr(module, "resolver_of", lambda run, tolerance: stand_in)
-    monkeypatch.setattr(unknowns, "measures", stand_in_measures)
+    monkeypatch.setattr(module, "measures", stand_in_measures)
     return stand_in
 
 
 @pytest.fixture
-def call(runs: Path, resolver: StandInResolver, tmp_path: Path) -> Callable[..., Result]:
+def call(made_runs: Path, resolver: StandInResolver, tmp_path: Path) -> Callable[..., Result]:
     """Return a function that runs the command on the run with orthoses."""
 
     def run(*words: object, problem: str = "mapd-orthosis", config: str = "perturbation") -> Result:
-        options = ["--run", runs / problem, "--out", tmp_path / "out", *words]
+        options = ["--run", made_runs / problem, "--out", tmp_path / "out", *words]
         return CliRunner().invoke(cli, ["perturb", config, *map(str, options)])
 
     return run
@@ -77,6 +66,7 @@ def test_shipped_config_holds_the_defaults() -> None:
     assert study == PerturbationStudy(base="mapd-orthosis")
 
 
+@pytest.mark.drawn
 def test_every_free_spring_is_moved_and_stands_beside_the_article(
     call: Callable[..., Result], resolver: StandInResolver, tmp_path: Path
 ) -> None:
@@ -127,7 +117,7 @@ def test_a_cheaper_spring_that_was_allowed_is_no_optimum(
         prescribed = "dorsiflexion_stiffness_left" in optimum.config.bounds.stiffness
         return {**numbers, "cost": numbers["cost"] * (0.98 if prescribed else 1.0)}
 
-    monkeypatch.setattr(unknowns, "measures", better)
+    monkeypatch.setattr(module, "measures", better)
     output = call().output
     assert "no true optimum: better by 1.9 %" in output
     assert "NO TRUE OPTIMUM: the cost falls for K_D left x 0.95, by 1.9 % at best" in output
@@ -164,7 +154,7 @@ def test_numbers_beside_the_article_only_for_its_factor(call: Callable[..., Resu
 
 
 def test_further_factors_start_from_nearer_ones(
-    runs: Path, resolver: StandInResolver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    made_runs: Path, resolver: StandInResolver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     starts = []
     solve = resolver.resolve
@@ -176,7 +166,7 @@ def test_further_factors_start_from_nearer_ones(
     study = PerturbationStudy(
         base="x", factors=(0.8, 1.2, 0.9), springs=("dorsiflexion_stiffness_left",)
     )
-    run = run_folder.load_run(runs / "mapd-orthosis")
+    run = run_folder.load_run(made_runs / "mapd-orthosis")
     result = perturb(study, run, Work(tmp_path))
     held = [c.bounds.stiffness.get("dorsiflexion_stiffness_left") for c in starts]
     assert held == [None, None, (36.0, 36.0)]

@@ -17,17 +17,20 @@ from click.testing import CliRunner, Result
 from made_c3d import cut, folder, motion, text, write_c3d
 from pathwalker_cli.commands.recorded import id_command, ik_command, import_command
 from pathwalker_cli.errors import ConfigError, DataError, InputError
-from pathwalker_cli.inverse.evaluate import dynamics_trials
-from pathwalker_cli.inverse.recorded_figures import joint_torque_figure, save_recorded_figures
-from pathwalker_cli.inverse.recorded_files import staged_folder
+from pathwalker_cli.inverse.figures import joint_torque_figure, save_recorded_figures
+from pathwalker_cli.inverse.residuals import residual_tables, study_warnings
+from pathwalker_cli.inverse.strengths import strength_table
 from pathwalker_cli.inverse.study import load_inverse_dynamics, load_inverse_kinematics
-from pathwalker_cli.inverse.study_tables import residual_tables, strength_table, study_warnings
+from pathwalker_cli.inverse.trials import dynamics_trials
+from pathwalker_cli.io.atomic import staged_folder
 from pathwalker_cli.io.opensim import read_opensim, write_opensim
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.patient.blocks import Strengths
 from pathwalker_cli.trajectory import Trajectory
+
+pytestmark = pytest.mark.usefixtures("sketched")
 
 PATIENT = "sreenivasa2017-patient"
 RECORDINGS = Path(__file__).parents[2] / "shared" / "recordings"
@@ -202,6 +205,7 @@ def test_another_mass_is_a_warning(tmp_path: Path) -> None:
     assert "are body_mass 40 kg and the segment lengths" in warnings[0]
 
 
+@pytest.mark.drawn
 def test_kinematics_study(tmp_path: Path) -> None:
     source, out = write_c3d(tmp_path / "walk.c3d"), tmp_path / "out"
     result = run(ik_command, "inverse-kinematics", "--out", out,
@@ -294,6 +298,7 @@ def test_a_marker_set_must_fix_all_coordinates(points: str, tmp_path: Path) -> N
     assert re.search("marker set: has [01] points for barefoot; allowed: at least 5", message)
 
 
+@pytest.mark.drawn
 def test_dynamics_of_the_shipped_recordings(tmp_path: Path) -> None:
     """The whole command on a fresh install, and the numbers of its tables."""
     out = tmp_path / "out"

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from helpers import called_apart
 from made_c3d import cut, text, write_c3d
+from pathwalker_cli.cli import cli
 from pathwalker_cli.paths import shipped
 
-COMMAND = [sys.executable, "-c", "from pathwalker_cli.cli import main; main()"]
 C3D = "walk.c3d"
 
 Words = list[str]
@@ -105,14 +105,19 @@ FAULTS: dict[str, tuple[Callable[[Path], object], Words, tuple[str, ...]]] = {
 """What is made in an empty folder, the words of the command, what its message says."""
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _imported_once() -> None:
+    """Let this process import what the commands need, before it is forked."""
+    for words in (kinematics(), dynamics("motion_cutoff=-6"), imported("-o", "/proc/pathwalker")):
+        assert CliRunner().invoke(cli, words).exit_code == 2
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_bad_input_is_one_sentence_and_leaves_nothing(fault: str, tmp_path: Path) -> None:
     make, words, said = FAULTS[fault]
     make(tmp_path / C3D)
     before = sorted(tmp_path.rglob("*"))
-    done = subprocess.run(
-        [*COMMAND, *words], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = called_apart(tmp_path, *words)
     assert done.returncode == 2, done.stderr
     assert done.stdout == ""
     assert done.stderr.startswith("Error: ")

@@ -17,12 +17,11 @@ import pytest
 import yaml
 from click.testing import CliRunner, Result
 
-from conftest import MadeSolution
+from conftest import MadeSolution, sketch
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.config.values import changed_values, differing_values
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.inverse.study import load_inverse_dynamics
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report import figures
@@ -31,9 +30,9 @@ from pathwalker_cli.report.gait_page import gait_page
 from pathwalker_cli.report.html import page_html, page_of
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.springs import recommended, spring_section, verdict_words
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
 from pathwalker_cli.studies.landscape.text import write_tables as write_landscape
-from pathwalker_cli.studies.measures import MEASURES
 from pathwalker_cli.studies.neighbours import Solved
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff, front_of, judged
 from pathwalker_cli.studies.tradeoff.result import write_tables as write_tradeoff
@@ -42,6 +41,8 @@ from pathwalker_cli.studies.uncertainty.result import Uncertainty
 from pathwalker_cli.studies.uncertainty.result import write_tables as write_uncertainty
 from pathwalker_cli.studies.verdict import verdict_of_metrics
 from report_runs import HOSTILE, made_verdict, write_made_run
+
+pytestmark = pytest.mark.usefixtures("sketched")
 
 VOID = frozenset({"meta", "link", "br", "hr", "img", "input", "col"})
 CHILD = Path(__file__).parent / "data" / "child-10y" / "patient.yaml"
@@ -147,6 +148,7 @@ def words_of(page: Page) -> str:
 # The page of one patient
 
 
+@pytest.mark.drawn
 def test_a_page_is_self_contained_and_valid(runs: Path, tmp_path: Path) -> None:
     out = tmp_path / "page.html"
     result = report(runs / "mapd-orthosis", runs / "mapd-barefoot", "-o", out)
@@ -198,13 +200,13 @@ def test_numbers_of_the_page_are_those_of_the_runs(runs: Path) -> None:
         ("effort_per_distance", "effort per distance"),
     ):
         barefoot, orthosis = (run.evaluation.row(key) for run in found)
-        assert rows[label][2] == number_text(barefoot.value, barefoot.quantity)
-        assert rows[label][5] == number_text(orthosis.value, orthosis.quantity)
+        assert rows[label][2] == barefoot.measure.text(barefoot.value)
+        assert rows[label][5] == orthosis.measure.text(orthosis.value)
         assert rows[label][4] == (barefoot.position or "")
         assert barefoot.value is not None
         assert orthosis.value is not None
         change = orthosis.value - barefoot.value
-        assert rows[label][8] == number_text(change, barefoot.quantity, sign=True)
+        assert rows[label][8] == barefoot.measure.text(change, sign=True)
     metrics = found[0].run.metrics
     shares = [metrics[f"stance_share_{side}"] for side in ("right", "left")]
     assert rows["stance share, left"][2] == f"{100 * shares[1]:.1f}"
@@ -378,6 +380,7 @@ def test_runs_of_one_condition_go_by_their_folders(
     assert "&lt;script&gt;" in text
 
 
+@pytest.mark.drawn
 def test_a_name_cannot_be_more_than_text_in_a_figure(
     made_solution: MadeSolution, runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -414,6 +417,7 @@ def test_a_table_with_rows_of_another_width_is_a_mistake() -> None:
         Table(("a", "b"), (Row(("1",)),))
 
 
+@pytest.mark.drawn
 @pytest.mark.usefixtures("no_curves")
 def test_hostile_notes_and_names_of_a_run_stay_text(runs: Path) -> None:
     path = runs / "mapd-orthosis" / "metrics.json"
@@ -489,12 +493,27 @@ def write_studies(folder: Path, run: Path, note: str = "") -> None:
     for name, content in contents.items():
         (folder / name).parent.mkdir(parents=True)
         (folder / name).write_text(json.dumps(content))
-    numbers = {measure.key: float(metrics[measure.key]) for measure in MEASURES}
+    numbers = {measure.key: float(metrics[measure.key]) for measure in measures_in("studies")}
     for name in ("landscape", "tradeoff", "uncertainty"):
         (folder / name).mkdir()
     write_landscape(made_landscape(metrics, numbers), folder / "landscape")
     write_tradeoff(made_tradeoff(metrics, numbers), folder / "tradeoff")
     write_uncertainty(made_uncertainty(metrics, numbers), folder / "uncertainty")
+
+
+@pytest.fixture
+def studies(written_studies: Path, tmp_path: Path) -> Path:
+    """Return a folder with a study of every kind that may be changed."""
+    return Path(shutil.copytree(written_studies, tmp_path / "studies"))
+
+
+@pytest.fixture(scope="module")
+def written_studies(written: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("studies")
+    with pytest.MonkeyPatch.context() as patch:
+        sketch(patch)
+        write_studies(folder, written / "mapd-orthosis")
+    return folder
 
 
 def made_landscape(metrics: dict[str, Any], numbers: dict[str, float]) -> Landscape:
@@ -548,7 +567,7 @@ def made_uncertainty(metrics: dict[str, Any], numbers: dict[str, float]) -> Unce
     factors = np.linspace(0.9, 1.1, 20)[:, None]
     draws = Draws((Input("body_mass", Distribution(relative=0.1)),), factors)
     config = load_config(metrics["problem"])
-    about = (config, metrics["patient"], 90, numbers, ranges, MEASURES, {})
+    about = (config, metrics["patient"], 90, numbers, ranges, measures_in("studies"), {})
     return Uncertainty(*about, draws, solved, 3.0, 1)
 
 
@@ -567,9 +586,10 @@ def test_studies_beside_a_run_add_their_tables(runs: Path) -> None:
     assert not any(s.title.startswith("Sensitivity") for s in barefoot.sections)
 
 
+@pytest.mark.drawn
 @pytest.mark.usefixtures("no_curves")
-def test_maps_fronts_and_spreads_are_drawn(runs: Path) -> None:
-    write_studies(runs, runs / "mapd-orthosis")
+def test_maps_fronts_and_spreads_are_drawn(runs: Path, written_studies: Path) -> None:
+    shutil.copytree(written_studies, runs, dirs_exist_ok=True)
     page = page_of([runs / "mapd-orthosis"])
     landscape = section(page, "Landscape")
     assert landscape.lines[0] == "Least cost at K_D 91.7, K_P 5.0 N m/rad (right side)."
@@ -619,19 +639,19 @@ def test_maps_fronts_and_spreads_are_drawn(runs: Path) -> None:
 )
 @pytest.mark.usefixtures("no_curves")
 def test_broken_studies_are_refused(
-    runs: Path, tmp_path: Path, file: str, wrong: dict[str, Any], told: str
+    runs: Path, studies: Path, tmp_path: Path, file: str, wrong: dict[str, Any], told: str
 ) -> None:
-    write_studies(tmp_path / "studies", runs / "mapd-orthosis")
-    path = tmp_path / "studies" / file
+    path = studies / file
     path.write_text(json.dumps(json.loads(path.read_text()) | wrong))
     sentence = refusal(runs / "mapd-orthosis", path.parent, "-o", tmp_path / "page.html")
     assert told in sentence
 
 
 @pytest.mark.usefixtures("no_curves")
-def test_studies_that_do_not_fit_are_refused_when_named(runs: Path, tmp_path: Path) -> None:
-    write_studies(tmp_path / "studies", runs / "mapd-orthosis")
-    studies, out = tmp_path / "studies", tmp_path / "page.html"
+def test_studies_that_do_not_fit_are_refused_when_named(
+    runs: Path, studies: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "page.html"
     named = page_of([runs / "mapd-orthosis", studies / "sensitivity"])
     assert section(named, "Sensitivity").tables
     assert "stands on another optimum" in refusal(
@@ -711,24 +731,25 @@ def test_kinds_of_pages_do_not_mix(runs: Path, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study of four recorded trials."""
-    from pathwalker_cli.inverse import recorded_study
-    from pathwalker_cli.inverse.evaluate import dynamics_trials
-    from pathwalker_cli.inverse.study_tables import residual_tables, strength_table
+    from pathwalker_cli.inverse import files
+    from pathwalker_cli.inverse.residuals import residual_tables
+    from pathwalker_cli.inverse.strengths import strength_table
+    from pathwalker_cli.inverse.trials import dynamics_trials
 
     folder = tmp_path_factory.mktemp("recorded")
     study = load_inverse_dynamics("inverse-dynamics", ("conditions=[barefoot]",))
     patient = load_patient(study.patient)
     trials = dynamics_trials(study, patient, lambda _: None)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(recorded_study, "save_recorded_figures", lambda *_: ())
-        recorded_study.write_dynamics(
+        patch.setattr(files, "save_recorded_figures", lambda *_: ())
+        files.write_dynamics(
             folder, trials, residual_tables(trials, patient, study),
-            strength_table(trials, patient, study), patient.body_mass, study.method,
+            strength_table(trials, patient, study), patient, study.method,
         )  # fmt: skip
-        recorded_study.write_origin(folder, patient, study.method)
     return folder
 
 
+@pytest.mark.drawn
 def test_recorded_gait_shows_stances_torques_and_strengths(recorded: Path, tmp_path: Path) -> None:
     page = page_of([recorded])
     stances = section(page, "Recorded stances").tables[0].rows

@@ -20,7 +20,7 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.commands.studies import StudyCall
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.studies import neighbours, unknowns
+from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies import tradeoff as module
 from pathwalker_cli.studies.base import Work, load_study
 from pathwalker_cli.studies.tradeoff import STUDY, TradeoffStudy, chain, tradeoff_of
@@ -32,6 +32,8 @@ from pathwalker_cli.studies.tradeoff.result import (
     judged,
     tradeoff_lines,
 )
+
+pytestmark = pytest.mark.usefixtures("sketched")
 
 FOUR = ("walking_speed_weights=[0, 0.5, 1, 2]",)
 ROUGH = (5e-3, 5e-2)
@@ -51,7 +53,7 @@ def point(name: str, speed: float, effort: float, **changes: Any) -> FrontPoint:
 @pytest.fixture
 def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
     """Return a function that computes a trade-off without a solve."""
-    monkeypatch.setattr(unknowns, "measures", made_measures)
+    monkeypatch.setattr(module, "measures", made_measures)
 
     def make(
         changes: tuple[str, ...] = FOUR, fails: Fails | None = None, errors: Any = (5e-4, 5e-3)
@@ -223,6 +225,7 @@ def test_a_fit_has_no_trade_off() -> None:
 # Files, figure, command
 
 
+@pytest.mark.drawn
 def test_files_and_figure(made: Make, tmp_path: Path) -> None:
     tradeoff, _ = made()
     (tmp_path / "out").mkdir()

@@ -20,14 +20,14 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results import run_folder
-from pathwalker_cli.results.run_folder import write_run
-from pathwalker_cli.studies import neighbours, unknowns
+from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies import uncertainty as module
 from pathwalker_cli.studies.base import Work, base_run, load_study
 from pathwalker_cli.studies.uncertainty import UncertaintyStudy, draw_cases, uncertainty
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input, draw, inputs_of
 from pathwalker_cli.studies.uncertainty.result import chance_level, rank_correlations, spreads
+
+pytestmark = pytest.mark.usefixtures("sketched")
 
 MadeSolution = Callable[..., GaitSolution]
 PATIENT = load_patient("sreenivasa2017-patient")
@@ -146,26 +146,17 @@ def test_chance_level_is_exceeded_by_idle_inputs_in_five_of_a_hundred_studies() 
 # The command
 
 
-@pytest.fixture(scope="module")
-def run_folder_path(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("runs") / "orthosis"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
-        write_run(folder, made_solution("mapd-orthosis"))
-    return folder
-
-
 @pytest.fixture
 def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
     stand_in = StandInResolver(load_case("mapd-orthosis"))
     for place in (module, neighbours):
         monkeypatch.setattr(place, "resolver_of", lambda run, tolerance: stand_in)
-    monkeypatch.setattr(unknowns, "measures", stand_in_measures)
+        monkeypatch.setattr(place, "measures", stand_in_measures)
     return stand_in
 
 
 @pytest.fixture
-def call(run_folder_path: Path, resolver: StandInResolver, tmp_path: Path) -> Callable[..., Result]:
+def call(made_runs: Path, resolver: StandInResolver, tmp_path: Path) -> Callable[..., Result]:
     study = tmp_path / "study.yaml"
     study.write_text(
         "base: mapd-orthosis\ndraws: 20\nquantities:\n"
@@ -175,7 +166,15 @@ def call(run_folder_path: Path, resolver: StandInResolver, tmp_path: Path) -> Ca
     )
 
     def run(*words: object) -> Result:
-        options = ["--run", run_folder_path, "--out", tmp_path / "out", "--workers", 1, *words]
+        options = [
+            "--run",
+            made_runs / "mapd-orthosis",
+            "--out",
+            tmp_path / "out",
+            "--workers",
+            1,
+            *words,
+        ]
         return CliRunner().invoke(cli, ["uncertainty", str(study), *map(str, options)])
 
     return run
@@ -186,6 +185,7 @@ def table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.drawn
 def test_the_command_tells_spreads_limits_and_what_matters(
     call: Callable[..., Result], resolver: StandInResolver, tmp_path: Path
 ) -> None:

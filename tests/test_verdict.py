@@ -28,6 +28,7 @@ from pathwalker_cli.studies.verdict import (
     _quadratic_edge,
     _stops,
     verdict_of,
+    verdict_of_metrics,
 )
 from pathwalker_cli.studies.verdict_text import verdict_lines
 
@@ -228,3 +229,21 @@ def test_real_springs_that_cost_less_than_the_optimum_are_a_warning() -> None:
         assert "WARNING" not in line
     far = replace(snapped, rise=0.94)
     assert "WARNING: 94 % above the springs found" in text(verdict(snapped=far))["real springs"]
+
+
+def test_other_numbers_are_told_in_degrees_with_their_direction() -> None:
+    angle = NumberVerdict(
+        "neutral_angle", "neutral angle", "rad", 0.04, (-0.06, 0.04), "upper", -4.0, 1e-2,
+        (0.03, 0.04), (False, True), True, tied=True,
+    )  # fmt: skip
+    play = replace(angle, name="free_play_left", label="free play left", value=0.02, limit="")
+    lines = text(verdict(numbers=(angle, play)))
+    assert "2.3 deg plantarflexion: set by its limit" in lines["neutral angle"]
+    assert "from 1.7 deg plantarflexion to 2.3 deg plantarflexion" in lines["neutral angle"]
+    assert "both sides are one number" in lines["neutral angle"]
+    assert "1.0 deg towards plantarflexion would save about 7 % more" in lines["neutral angle"]
+    assert lines["free play left"].startswith("1.1 deg: ")
+    content = json.loads(json.dumps(verdict(numbers=(angle,)).as_dict()))
+    again = verdict_of_metrics({"verdict": content})
+    assert again is not None
+    assert again.numbers == (angle,)

@@ -22,7 +22,6 @@ from pathwalker_cli.checking.studies import check_batch, check_study
 from pathwalker_cli.config import StudyConfig, config_content, find_config
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import ConfigError, placed
-from pathwalker_cli.inverse.evaluate import require_trials
 from pathwalker_cli.inverse.markers import MarkerSet, load_marker_set, marker_points
 from pathwalker_cli.inverse.study import (
     InverseDynamicsConfig,
@@ -31,13 +30,14 @@ from pathwalker_cli.inverse.study import (
     load_inverse_dynamics,
     load_inverse_kinematics,
 )
+from pathwalker_cli.inverse.trials import require_trials
 from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.yaml_file import load_yaml
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient, shipped_patients
 from pathwalker_cli.problems import problem_named
-from pathwalker_cli.results.orthosis_text import orthosis_rows
+from pathwalker_cli.results.text import orthosis_rows
 from pathwalker_cli.studies.batch.schema import BatchStudy
 from pathwalker_cli.studies.registry import STUDIES
 

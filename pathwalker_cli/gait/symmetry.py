@@ -43,11 +43,19 @@ def asymmetries(walker: Walker) -> list[str]:
 
 
 def require_symmetry(walker: Walker) -> None:
-    """Refuse half a cycle of a walker whose sides differ.
+    """Refuse half a cycle of a walker whose sides differ, or of which one alone is to be chosen.
 
     Raises:
-        ConfigError: If they do.
+        ConfigError: If so.
     """
+    names = {unknown.name for unknown in walker.unknowns}
+    alone = [unknown for unknown in walker.unknowns if mirrored(unknown.name) not in names]
+    if alone:
+        raise ConfigError(
+            f"frees one side alone, but half a cycle makes both sides alike ({alone[0].name})",
+            where=f"free.{alone[0].address}",
+            mend=f"free {alone[0].numbers[0].place} for both sides, or set half_cycle to false",
+        )
     differing = asymmetries(walker)
     if differing:
         raise ConfigError(

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.io.csv_file import read_cells, write_table
+from pathwalker_cli.io.csv_file import as_text, read_cells, write_table
 from pathwalker_cli.trajectory import Trajectory
 
 __all__ = ["read_trajectory", "write_trajectory"]
@@ -29,7 +29,7 @@ def write_trajectory(path: str | Path, trajectory: Trajectory, digits: int = 6) 
     names = zip(trajectory.names, trajectory.units, strict=True)
     header = ["time [s]", *(f"{name} [{unit}]" for name, unit in names)]
     rows = np.column_stack([trajectory.time, trajectory.values])
-    write_table(path, header, ([_text(value, digits) for value in row] for row in rows))
+    write_table(path, header, ([as_text(value, digits) for value in row] for row in rows))
 
 
 def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
@@ -42,20 +42,26 @@ def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
     Raises:
         DataError: If the file cannot be read; the message names row and column.
     """
-    rows = read_cells(Path(path), "check the path")
+    rows = [row for row in read_cells(Path(path), "check the path", "utf-8-sig") if row]
     if not rows:
         raise DataError("is empty", where=str(path))
     names, units = _header(rows[0], path)
     values = np.empty((len(rows) - 1, len(names)))
     for index, row in enumerate(rows[1:]):
-        number = index + 2
         if len(row) != len(names):
             raise DataError(
-                f"has {len(row)} cells", where=f"{path}, row {number}", allowed=f"{len(names)}"
+                f"has {len(row)} cells", where=f"{path}, row {index + 2}", allowed=f"{len(names)}"
             )
-        for column, cell in enumerate(row):
-            place = f"{path}, row {number}, column {names[column]}"
-            values[index, column] = _number(cell, place, missing and column > 0)
+        try:
+            values[index] = [float(cell) for cell in row]
+        except ValueError:
+            values[index] = [_number(cell) for cell in row]
+    for index, column in np.argwhere(~np.isfinite(values)):
+        cell = rows[index + 1][column].strip()
+        if cell or column == 0 or not missing:
+            where = f"{path}, row {index + 2}, column {names[column]}"
+            shown = f"'{cell}'" if cell else "empty"
+            raise DataError(f"is {shown}", where=where, allowed="a finite number")
     time = values[:, 0]
     if time.size == 0:
         raise DataError("has no rows below its header", where=str(path))
@@ -88,20 +94,9 @@ def _header(row: list[str], path: str | Path) -> tuple[list[str], list[str]]:
     return names, units
 
 
-def _number(cell: str, place: str, missing: bool) -> float:
-    """Return the number in a cell."""
-    if missing and not cell.strip():
-        return math.nan
+def _number(cell: str) -> float:
+    """Return the number in a cell, NaN where there is none."""
     try:
-        value = float(cell)
+        return float(cell)
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        shown = f"'{cell.strip()}'" if cell.strip() else "empty"
-        raise DataError(f"is {shown}", where=place, allowed="a finite number")
-    return value
-
-
-def _text(value: float, digits: int) -> str:
-    """Return a number as text."""
-    return "" if math.isnan(value) else f"{value:.{digits}g}"
+        return math.nan

@@ -30,8 +30,8 @@ __all__ = [
 Model = TypeVar("Model", bound=BaseModel)
 
 
-class _Loader(yaml.SafeLoader):
-    """Safe loader in which 1e-4 is a number and dates stay text."""
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """Safe loader, compiled if possible, in which 1e-4 is a number and dates stay text."""
 
 
 _FLOAT = re.compile(
@@ -52,6 +52,7 @@ _MOST_BYTES: Final = 1_000_000
 """Size of a file that is read; the largest shipped one has some 10 000 bytes."""
 _MOST_VALUES: Final = 50_000
 _DEEPEST: Final = 40
+_ABYSS: Final = 1000
 _OF_TAGS: Final = (ValueError, LookupError, AttributeError, TypeError)
 """What the library raises for values that do not fit an explicit tag such as `!!int`."""
 
@@ -113,6 +114,7 @@ def _content(text: str, path: str, error: type[InputError]) -> tuple[Any, Lines]
     lines: dict[KeyPath, int] = {}
     loader = None
     try:
+        _refuse_abyss(text, path, error)
         loader = _Loader(text)
         node = loader.get_single_node()
         _find_lines(node, path, error, lines)
@@ -230,6 +232,16 @@ def _find_lines(
         for index, item in enumerate(node.value):
             lines[(*prefix, index)] = item.start_mark.line + 1
             _find_lines(item, where, error, lines, (*prefix, index))
+
+
+def _refuse_abyss(text: str, where: str, error: type[InputError]) -> None:
+    """Refuse levels of which the compiled loader, which calls itself for each, would die."""
+    depth = 0
+    for event in yaml.parse(text, _Loader):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > _ABYSS:
+            raise _too_deep(where, error)
 
 
 def _too_deep(where: str, error: type[InputError]) -> InputError:

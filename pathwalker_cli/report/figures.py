@@ -7,18 +7,19 @@ from collections.abc import Callable, Sequence
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from pathwalker_cli.evaluation.cycle_curves import (
+from pathwalker_cli.evaluation.curves import (
     ACTIVATIONS,
     ANGLES,
     FORCES,
     MOMENTS,
     CycleCurve,
+    Trace,
     known_curves,
+    traces,
 )
 from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_handles
-from pathwalker_cli.evaluation.traces import Trace, lone_trace, traces
-from pathwalker_cli.inverse.evaluate import StudyTrial
-from pathwalker_cli.inverse.recorded_figures import joint_torque_figure, name_figure
+from pathwalker_cli.inverse.figures import joint_torque_figure, name_figure
+from pathwalker_cli.inverse.trials import Trial
 from pathwalker_cli.patient.blocks import SpringSet
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
@@ -63,9 +64,7 @@ def curve_section(runs: Sequence[ReportRun]) -> Section:
     )  # fmt: skip
 
 
-def torque_drawing(
-    trials: Sequence[StudyTrial], body_mass: float, name: str, title: str
-) -> Drawing:
+def torque_drawing(trials: Sequence[Trial], body_mass: float, name: str, title: str) -> Drawing:
     """Return the recorded joint torques of one condition.
 
     Args:
@@ -114,7 +113,8 @@ def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
     """Return the gaits of the runs over their recordings."""
     gaits_recorded = [(run.evaluation.gait, run.evaluation.recorded) for run in runs]
     if len(gaits_recorded) == 1:
-        return (lone_trace(*gaits_recorded[0]),)
+        gait, behind = gaits_recorded[0]
+        return (Trace(gait, gait.problem, behind),)
     gaits, recorded = zip(*gaits_recorded, strict=True)
     return traces(gaits, [run.label for run in runs], recorded)
 

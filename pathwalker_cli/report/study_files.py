@@ -9,10 +9,10 @@ import numpy as np
 
 from pathwalker_cli.io.csv_file import read_rows
 from pathwalker_cli.report.folders import Study
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
-from pathwalker_cli.studies.measures import MEASURES
+from pathwalker_cli.studies.measures import Ranges, measures_with
 from pathwalker_cli.studies.uncertainty.result import Spread
-from pathwalker_cli.studies.unknowns import Ranges, measures_with
 
 __all__ = ["Spreads", "landscape_of", "spreads_of"]
 
@@ -37,7 +37,7 @@ def landscape_of(study: Study) -> Landscape:
             status=row["status"],
             iterations=0,
             seconds=0.0,
-            measures={m.key: float(row[m.key]) for m in MEASURES if row.get(m.key)},
+            measures={m.key: float(row[m.key]) for m in measures_in("studies") if row.get(m.key)},
         )
         for row in rows
     )

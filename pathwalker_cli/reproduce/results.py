@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,15 +14,17 @@ from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.paper import PATIENT
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
-from pathwalker_cli.evaluation.run import gait_of_series
-from pathwalker_cli.inverse.evaluate import dynamics_trials
+from pathwalker_cli.inverse.residuals import COMPONENTS, residual_tables
+from pathwalker_cli.inverse.strengths import strength_table
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, load_inverse_dynamics
-from pathwalker_cli.inverse.study_tables import residual_tables, strength_table
+from pathwalker_cli.inverse.trials import dynamics_trials
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.stride import stride_of
 
 __all__ = [
     "METHODS",
@@ -41,8 +43,6 @@ METHODS: Final = ("default", "published")
 
 NO_C3D: Final = "not computed: the published method needs the article's C3D files (--c3d)"
 """Why there is no result of the published method."""
-
-_PARTS: Final = ("forward", "up", "moment")
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,8 @@ def inverse_result(config: InverseDynamicsConfig, file: Path) -> tuple[InverseRe
         f"{table.condition}_{part}_{kind}": float(value)
         for table in residual_tables(trials, patient, config)
         if table.part == "whole cycle" and (span := table.range) is not None
-        for kind, values in (("mean", span.mean), ("min", span.lowest), ("max", span.highest))
-        for part, value in zip(_PARTS, values / table.body_mass, strict=True)
+        for kind, values in span.items()
+        for part, value in zip(COMPONENTS, values / table.body_mass, strict=True)
     }
     rows = strength_table(trials, patient, config).rows
     result = InverseResult(
@@ -136,6 +136,7 @@ class ProblemResult:
     Args:
         problem: Its name.
         metrics: Content of `metrics.json`.
+        bounds: Bounds that hold the solution back.
         config: The config that was solved.
         kept: Whether it was solved before and not again.
         series: The stride, None if it did not converge.
@@ -144,6 +145,7 @@ class ProblemResult:
 
     problem: str
     metrics: Mapping[str, Any]
+    bounds: tuple[ActiveBound, ...]
     config: StudyConfig
     kept: bool
     series: GaitSeries | None = None
@@ -207,11 +209,11 @@ def evaluated(
     """
     run = load_run(folder, allow_unconverged=True)
     config, metrics = run.config, run.metrics
-    result = ProblemResult(config.problem, metrics, config, kept)
+    result = ProblemResult(config.problem, metrics, run.result.bounds, config, kept)
     if metrics["status"] != "converged":
         return result
     series = gait_series(run.case.walker(), run.motion)
-    gait = gait_of_series(series, config.problem, config.problem, metrics["effort"])
+    gait = stride_of(series, config.problem, config.problem)
     theirs = recorded.get(config.condition) if run.case.patient.id == PATIENT else None
     evaluation = evaluate_gait(gait, recorded=theirs)
-    return ProblemResult(config.problem, metrics, config, kept, series, evaluation)
+    return replace(result, series=series, evaluation=evaluation)

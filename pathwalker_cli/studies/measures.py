@@ -1,105 +1,76 @@
-"""What the neighbours of a study are compared by: cost and gait metrics as plain numbers."""
+"""What neighbours are compared by: cost, measures of the gait and free numbers, SI units."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Final
+from collections.abc import Mapping, Sequence
+from typing import Final
 
-from pathwalker_cli.conventions import STIFFNESSES, to_degrees
+from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.resolve import Optimum
-from pathwalker_cli.stride.metrics import gait_metrics
+from pathwalker_cli.model.numbers import Unknown
+from pathwalker_cli.stride.measure import Measure
+from pathwalker_cli.stride.measures import measures_in, numbers_of
+from pathwalker_cli.stride.stride import stride_of
 
 __all__ = [
     "COMPARED",
-    "MEASURES",
-    "Measure",
+    "Ranges",
     "all_measures",
-    "measure_of",
+    "free_units",
     "measures",
+    "measures_with",
+    "range_content",
+    "ranges_of",
 ]
 
-
-@dataclass(frozen=True)
-class Measure:
-    """One number of a neighbour.
-
-    Args:
-        key: Its name in files.
-        label: Its name for people.
-        unit: SI unit in files.
-        short: Its name as the heading of a narrow column.
-    """
-
-    key: str
-    label: str
-    unit: str
-    short: str
-
-    @property
-    def column(self) -> str:
-        """Heading of its column in files, e.g. "stride_time [s]"."""
-        return f"{self.key} [{self.unit}]"
-
-    @property
-    def shown_unit(self) -> str:
-        """Unit for people: degrees for angles."""
-        return "deg" if self.unit == "rad" else self.unit
-
-    def shown(self, value: float) -> float:
-        """Return a value in the unit for people."""
-        return float(to_degrees(value)) if self.unit == "rad" else value
-
-
-_SPRINGS: Final = tuple(
-    Measure(name, f"K_{name[0].upper()} {name.rsplit('_', 1)[1]}", "N m/rad",
-            f"K_{name[0].upper()} {name.rsplit('_', 1)[1][0]}")
-    for name in STIFFNESSES
+COMPARED: Final = (
+    "cost",
+    *(f"{stem}_{side}" for stem in ("min_stance_knee_flexion", "step_length")
+      for side in ("left", "right")),
+    "walking_speed",
 )  # fmt: skip
-
-MEASURES: Final = (
-    Measure("cost", "cost", "1", "cost"),
-    Measure("effort_per_distance", "effort per distance", "s/m", "effort"),
-    Measure("min_stance_knee_flexion_left", "least stance knee flexion, left", "rad", "knee l"),
-    Measure("min_stance_knee_flexion_right", "least stance knee flexion, right", "rad", "knee r"),
-    Measure("step_length_left", "step length, left", "m", "step l"),
-    Measure("step_length_right", "step length, right", "m", "step r"),
-    Measure("walking_speed", "walking speed", "m/s", "speed"),
-    Measure("stride_time", "stride time", "s", "stride"),
-    *_SPRINGS,
-)  # fmt: skip
-"""The measures that every study tells, in order; barefoot there are no springs."""
-
-COMPARED: Final = ("cost", *(m.key for m in MEASURES[2:7]))
 """The measures of table 5 of Sreenivasa et al. (2017)."""
 
-
-def measure_of(key: str) -> Measure:
-    """Return a measure by its key."""
-    return next(measure for measure in MEASURES if measure.key == key)
+Ranges = Mapping[str, tuple[float, float]]
+"""Least and largest value of every spring and of every other number that is free, by name [SI]."""
 
 
 def all_measures(optimum: Optimum) -> dict[str, float]:
-    """Return the cost and every gait metric that is one number; SI units."""
-    values = gait_metrics(optimum.series).as_dict()
-    numbers = {k: v for k, v in values.items() if isinstance(v, float)}
-    for name in ("joint_range", "peak_joint_moment", "peak_activation", "phase_durations"):
-        numbers |= _flat(name, values[name])
-    return {"cost": optimum.cost, **numbers}
-
-
-def _flat(name: str, values: Mapping[str, Any]) -> dict[str, float]:
-    """Return the entries of a metric with several; a pair is least and largest value."""
-    flat: dict[str, float] = {}
-    for key, value in values.items():
-        if isinstance(value, list):
-            flat |= {f"{name}.{key}.min": value[0], f"{name}.{key}.max": value[1]}
-        elif value is not None:
-            flat[f"{name}.{key}"] = float(value)
-    return flat
+    """Return the cost and every single number of the gait."""
+    return {"cost": optimum.cost, **numbers_of(stride_of(optimum.series))}
 
 
 def measures(optimum: Optimum) -> dict[str, float]:
-    """Return the numbers of `MEASURES` that a neighbour has; SI units."""
-    found = all_measures(optimum)
-    return {m.key: found[m.key] for m in MEASURES if m.key in found}
+    """Return the measures that every study tells, then free numbers that are no springs."""
+    numbers, unknowns = all_measures(optimum), optimum.series.walker.unknowns
+    told = {m.key: numbers[m.key] for m in measures_in("studies") if m.key in numbers}
+    return told | {u.name: optimum.value(u) for u in unknowns if u.name not in STIFFNESSES}
+
+
+def free_units(unknowns: Sequence[Unknown]) -> dict[str, str]:
+    """Return the SI units of the unknowns beside the four springs, by name."""
+    return {u.name: u.unit for u in unknowns if u.name not in STIFFNESSES}
+
+
+def measures_with(units: Mapping[str, str]) -> tuple[Measure, ...]:
+    """Return the measures that every study tells, then free numbers by name and SI unit."""
+    words = {name: name.replace("_", " ") for name in units}
+    free = (Measure(name, words[name], unit, "", None) for name, unit in units.items())
+    return (*measures_in("studies"), *free)
+
+
+def ranges_of(optimum: Optimum) -> dict[str, tuple[float, float]]:
+    """Return the allowed range of every spring and unknown; none where it follows another one."""
+    ranges = dict(optimum.solver.bounds.ranges)
+    springs = STIFFNESSES if optimum.config.condition == "orthosis" else ()
+    if not all(name in ranges for name in springs):
+        values = zip(springs, optimum.stiffness.tolist(), strict=True)
+        ranges = {name: (value, value) for name, value in values} | ranges
+    return {name: ranges[name] for name in dict.fromkeys((*springs, *ranges))}
+
+
+def range_content(ranges: Ranges) -> dict[str, dict[str, tuple[float, float]]]:
+    """Return ranges as plain values, those of springs apart from others if there are any."""
+    springs = {name: pair for name, pair in ranges.items() if name in STIFFNESSES}
+    others = {name: pair for name, pair in ranges.items() if name not in STIFFNESSES}
+    return {"stiffness_ranges": springs, **({"number_ranges": others} if others else {})}

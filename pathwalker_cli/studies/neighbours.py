@@ -17,12 +17,12 @@ from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.io.processes import results_of_calls
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
+from pathwalker_cli.results.metrics import sha256
 from pathwalker_cli.results.motion_file import read_arrays
 from pathwalker_cli.results.run_folder import Run
-from pathwalker_cli.results.run_metrics import sha256
 from pathwalker_cli.studies.base import require_optimum, resolver_of
 from pathwalker_cli.studies.branches import Solve, Values
-from pathwalker_cli.studies.unknowns import numbers_of
+from pathwalker_cli.studies.measures import measures
 
 __all__ = [
     "STOPPED",
@@ -239,7 +239,7 @@ def _solved(journal: Journal, name: str, case: Case) -> Solved:
     """Solve one neighbour."""
     before = journal.solved
     optimum = journal.resolve(name, case)
-    values = numbers_of(optimum) if optimum.converged else {}
+    values = measures(optimum) if optimum.converged else {}
     result = optimum.result
     kept = journal.solved == before
     return Solved(name, result.status, values, result.iterations, result.seconds, kept)

@@ -8,11 +8,13 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import STIFFNESSES, to_degrees
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.results.text import angle_words
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, NumberVerdict, StopVerdict, Verdict
 
 __all__ = [
     "PRESCRIBED",
+    "number_text",
     "per_degree",
     "reservations",
     "snapped_warning",
@@ -26,13 +28,15 @@ _BEATEN: Final = 1e-3
 PRESCRIBED: Final = "prescribed by the config, not identified"
 
 _SOFTER: Final = {"lower": ("softer", -1.0), "upper": ("stiffer", 1.0)}
+_WIDTH: Final = "rad wide"
 _LESS: Final = {"lower": ("less", -1.0), "upper": ("more", 1.0)}
+_TURNED: Final = {"lower": ("towards dorsiflexion", -1.0), "upper": ("towards plantarflexion", 1.0)}
 
 
 def verdict_lines(verdict: Verdict) -> Iterator[tuple[str, str]]:
     """Yield label and text of every line."""
     for number in (*verdict.springs, *verdict.numbers):
-        yield number.label, _number(number)
+        yield number.label, number_text(number)
     reached = [stop for stop in verdict.stops if stop.excess > 0.0]
     yield "hard stops", "; ".join(map(stop_text, reached)) or "none is reached"
     if verdict.starts > 1:
@@ -53,21 +57,28 @@ def shown(value: float, unit: str, second: bool = True) -> str:
 
     Args:
         value: The number [unit].
-        unit: SI unit.
-        second: Whether a stiffness is also given per degree.
+        unit: SI unit, see `_unit`; an angle is one of the ankle, + = plantarflexion.
+        second: Whether a stiffness is also given per degree, an angle with its direction.
     """
-    if unit == "rad":
+    if unit == _WIDTH:
         return f"{float(to_degrees(value)):.1f} deg"
+    if unit == "rad":
+        return angle_words(value) if second else f"{float(to_degrees(abs(value))):.1f} deg"
     if unit == "N m/rad":
         each = f" ({per_degree(value):.2f} N m/deg)" if second else ""
         return f"{value:.1f} N m/rad{each}"
     return f"{value:.3g} {unit}"
 
 
+def _unit(number: NumberVerdict) -> str:
+    """Return the unit of a number, that of a width where it is an angle without direction."""
+    return _WIDTH if number.name.startswith("free_play") else number.unit
+
+
 def _span(low: float, high: float, unit: str) -> str:
     """Return a range like `shown`."""
-    if unit == "rad":
-        return f"{float(to_degrees(low)):.1f} to {float(to_degrees(high)):.1f} deg"
+    if unit in ("rad", _WIDTH):
+        return f"{shown(low, unit)} to {shown(high, unit)}"
     if unit == "N m/rad":
         return (
             f"{low:.1f} to {high:.1f} N m/rad ({per_degree(low):.2f} to {per_degree(high):.2f} "
@@ -76,15 +87,16 @@ def _span(low: float, high: float, unit: str) -> str:
     return f"{low:.3g} to {high:.3g} {unit}"
 
 
-def _number(number: NumberVerdict) -> str:
+def number_text(number: NumberVerdict) -> str:
     """Return what is known of a number."""
-    value = shown(number.value, number.unit)
+    unit = _unit(number)
+    value = shown(number.value, unit)
     if number.prescribed:
         return f"{value}: {PRESCRIBED}"
     what = "springs that are" if number.unit == "N m/rad" else "range that is"
     text = (
         f"{value}: {number.determined}; the cost stays within {100 * SHARE:g} % of the best from "
-        f"{_span(*number.region, number.unit)}, {100 * number.width:.0f} % of the {what} allowed"
+        f"{_span(*number.region, unit)}, {100 * number.width:.0f} % of the {what} allowed"
     )
     both = ["both sides are one number"] if number.tied else []
     return "; ".join([text, *both, *reservations(number)])
@@ -96,16 +108,17 @@ def reservations(number: NumberVerdict) -> Iterator[str]:
         return
     far = [end for end, again in zip(number.range, number.again, strict=True) if again]
     if far:
-        ends = " and ".join(shown(end, number.unit, second=False) for end in far)
+        ends = " and ".join(shown(end, _unit(number), number.unit == "rad") for end in far)
         ends = ends.replace(" N m/rad and", " and")
         yield f"the cost is as good again at {ends}, another local optimum"
     if number.limit:
-        word, sign = (_SOFTER if number.unit == "N m/rad" else _LESS)[number.limit]
+        words = {"N m/rad": _SOFTER, "rad": _TURNED}
+        word, sign = words.get(_unit(number), _LESS)[number.limit]
         step = _noticeable(number)
         saved = -100.0 * sign * number.gradient * step
         yield (
-            f"it sits at the {number.limit} limit: {shown(step, number.unit, second=False)} {word} "
-            f"would save about {saved:.2g} % more"
+            f"it sits at the {number.limit} limit: {shown(step, _unit(number), second=False)} "
+            f"{word} would save about {saved:.2g} % more"
         )
     if not number.certain:
         yield "the ends of this region are not certain: the problems beyond did not converge"
@@ -163,7 +176,7 @@ def snapped_warning(verdict: Verdict) -> str:
 def _snapped(verdict: Verdict) -> str:
     snapped = verdict.snapped
     if snapped is None:
-        return "the patient's file lists none (orthosis.names)"
+        return "the patient's file lists none (orthosis.springs)"
     chosen = ", ".join(
         f"{measure_of(name).label} {snapped.names[name]} ({stiffness:.1f} N m/rad, "
         f"{per_degree(stiffness):.2f} N m/deg)"

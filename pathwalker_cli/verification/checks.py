@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -18,12 +18,13 @@ from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.results.metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run
-from pathwalker_cli.results.run_metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.stride.balance import balance
-from pathwalker_cli.stride.metrics import GaitMetrics, gait_metrics
+from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.stride.verify import equation_residual, reintegrate, second_engine_residual
 
 __all__ = ["Check", "Verification", "verify_run"]
@@ -110,7 +111,7 @@ def verify_run(folder: str | Path) -> Verification:
     run = load_run(folder)
     solver = GaitSolver(run.case)
     series = gait_series(solver.walker, run.motion)
-    numbers = gait_metrics(series)
+    numbers = metrics_of(stride_of(series))
     checks = (
         *_files(run, series),
         *_numbers(run, solver, numbers),
@@ -154,54 +155,41 @@ def _same_table(path: Path, expected: Path) -> Check:
     wanted = [line.split(",") for line in expected.read_text(encoding="utf-8").splitlines()]
     if [len(row) for row in cells] != [len(row) for row in wanted] or cells[:1] != wanted[:1]:
         return Check(path.name, math.inf, _SAME, "relative", "has other rows or columns")
-    worst, place = 0.0, ""
-    scale = _column_scales(wanted)
-    for i, (mine, other) in enumerate(zip(cells[1:], wanted[1:], strict=True), start=2):
-        for j, (one, two) in enumerate(zip(mine, other, strict=True)):
-            difference = 0.0 if one == two else _difference(one, two, scale[j])
-            if difference > worst:
-                worst, place = difference, f"line {i}, {wanted[0][j]}"
-    return Check(path.name, worst, _SAME, "relative", f"in {place}" if place else "")
+    columns = [[abs(_float(cell)) for cell in column] for column in zip(*wanted[1:], strict=True)]
+    scales = [max(filter(math.isfinite, column), default=0.0) or 1.0 for column in columns]
+    return _largest(path.name, (
+        (f"line {i}, {heading}", 0.0 if one == two else abs(_float(one) - _float(two)) / scale)
+        for i, rows in enumerate(zip(cells[1:], wanted[1:], strict=True), start=2)
+        for one, two, heading, scale in zip(*rows, wanted[0], scales, strict=True)
+    ))  # fmt: skip
 
 
-def _column_scales(rows: list[list[str]]) -> list[float]:
-    """Return the largest amount in every column; 1 where there is none."""
-    columns = zip(*rows[1:], strict=True)
-    return [max((abs(_number(cell)) for cell in column), default=0.0) or 1.0 for column in columns]
-
-
-def _number(cell: str) -> float:
+def _float(cell: str) -> float:
+    """Return the number in a cell, NaN for anything else."""
     try:
-        value = float(cell)
+        return float(cell)
     except ValueError:
-        return 0.0
-    return value if math.isfinite(value) else 0.0
+        return math.nan
 
 
-def _difference(one: str, two: str, scale: float) -> float:
-    """Return the difference of two cells by the scale of their column; infinite if not numbers."""
-    try:
-        difference = abs(float(one) - float(two)) / scale
-    except ValueError:
-        return math.inf
-    return difference if math.isfinite(difference) else math.inf
+def _largest(name: str, differences: Iterable[tuple[str, float]]) -> Check:
+    """Return the largest of relative differences by place; NaN counts as infinite."""
+    known = ((place, d if math.isfinite(d) else math.inf) for place, d in differences)
+    place, worst = max(known, key=lambda pair: pair[1], default=("", 0.0))
+    return Check(name, worst, _SAME, "relative", f"in {place}" if worst else "")
 
 
-def _numbers(run: Run, solver: GaitSolver, numbers: GaitMetrics) -> Iterator[Check]:
+def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[Check]:
     """Yield whether metrics.json says what follows from the motion."""
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
-    made: dict[str, Any] = numbers.as_dict()
+    made = dict(numbers)
     if run.config.transcription == "collocation":
         terms = cost_terms(run.motion, solver.gait.costs, solver.weights, solver.samples)
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
         made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)
-    worst, place = 0.0, ""
-    for key, value in _flat(made):
-        difference = _apart(_at(metrics, key), value)
-        if difference > worst:
-            worst, place = difference, ".".join(key)
-    yield Check("metrics.json", worst, _SAME, "relative", f"in {place}" if place else "")
+    pairs = ((".".join(key), _apart(_at(metrics, key), value)) for key, value in _flat(made))
+    yield _largest("metrics.json", pairs)
 
 
 def _flat(content: Any, key: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
@@ -237,7 +225,7 @@ def _apart(one: Any, two: Any) -> float:
     return 0.0 if one == two else math.inf
 
 
-def _dynamics(run: Run, series: GaitSeries, numbers: GaitMetrics) -> Iterator[Check]:
+def _dynamics(run: Run, series: GaitSeries, numbers: dict[str, Any]) -> Iterator[Check]:
     """Yield engines, integrator and conservation laws."""
     config = run.config
     if config.transcription != "collocation":
@@ -266,7 +254,7 @@ def _dynamics(run: Run, series: GaitSeries, numbers: GaitMetrics) -> Iterator[Ch
     )
     for name, share, limit in shares:
         yield Check(name, share if refined else None, limit, "share", note)
-    pull = max(0.0, -numbers.min_vertical_force)
+    pull = max(0.0, -numbers["min_vertical_force"])
     yield Check("ground pulls", pull, _EQUATIONS, "N")
 
 

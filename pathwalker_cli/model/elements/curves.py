@@ -87,10 +87,27 @@ def evaluate(chain: BezierChain, x: Any) -> BezierPoint:
     Returns:
         Value, slope and curvature, each shaped like x; exact to about 1e-14 of the knot values.
     """
-    if isinstance(x, ca.SX) and chain.is_numeric:
+    if not chain.is_numeric:
+        return _evaluated(chain, _step_sums(chain, _pieces(chain), x), x)
+    if isinstance(x, ca.SX):
         return BezierPoint(*_function(chain).call([x], True, False))
-    controls = [chain.controls(i) for i in range(len(chain.x) - 1)]
-    return _evaluated(chain, controls, x)
+    edges, pieces = _table(chain)
+    return _evaluated(chain, pieces[:, edges.searchsorted(x, "right")], x)
+
+
+def _pieces(chain: BezierChain) -> list[list[Any]]:
+    """Return begin, width, values, slopes and inner control points of all pieces, 8 rows."""
+    pieces = range(len(chain.x) - 1)
+    width = [chain.x[i + 1] - chain.x[i] for i in pieces]
+    ends = [[row[i + k] for i in pieces] for row in (chain.y, chain.slopes) for k in (0, 1)]
+    controls = zip(*map(chain.controls, pieces), strict=True)
+    return [list(chain.x[:-1]), width, *ends, *map(list, controls)]
+
+
+@lru_cache(maxsize=64)
+def _table(chain: BezierChain) -> tuple[np.ndarray, np.ndarray]:
+    """Return edges, shape (n - 2,), and pieces, shape (8, n - 1), of a chain of numbers."""
+    return np.array(chain.x[1:-1]), np.array(_pieces(chain))
 
 
 @dataclass(frozen=True)
@@ -136,24 +153,15 @@ def _any_chain(knots: int, newton_steps: int) -> ca.Function:
     inputs += [ca.SX.sym(name, knots - 1) for name in "ab"]
     xs, ys, slopes, a, b = map(ca.vertsplit, inputs)
     chain = BezierChain(xs, ys, slopes, np.nan, newton_steps)  # a and b know the curviness
-    point = _evaluated(chain, list(zip(a, b, strict=True)), x)
+    point = _evaluated(chain, _step_sums(chain, [*_pieces(chain)[:6], a, b], x), x)
     return ca.Function("chain", [x, *inputs], [point.value, point.slope, point.curvature])
 
 
-def _evaluated(chain: BezierChain, controls: Sequence[tuple[Any, Any]], x: Any) -> BezierPoint:
-    """Return the curve at x by the inner control points of its pieces."""
-    pieces = range(len(controls))
+def _evaluated(chain: BezierChain, piece: Any, x: Any) -> BezierPoint:
+    """Return the curve at x by the row of `_pieces` that x lies in."""
+    x0, width, y0, y5, s0, s5, a, b = piece
     above, below = x > chain.x[-1], x < chain.x[0]
     inside = 1 - above - below
-    passed = [x >= edge for edge in chain.x[1:-1]]
-
-    def pick(values: Sequence[Any]) -> Any:
-        return _step_sum(x, passed, values)
-
-    x0, width = pick(chain.x[:-1]), pick([chain.x[i + 1] - chain.x[i] for i in pieces])
-    y0, y5 = pick(chain.y[:-1]), pick(chain.y[1:])
-    s0, s5 = pick(chain.slopes[:-1]), pick(chain.slopes[1:])
-    a, b = pick([pair[0] for pair in controls]), pick([pair[1] for pair in controls])
     # outside the knots the parameter stays at the end, where value and slope are the knot's
     target = (x - x0) / width * inside + above
     u = _invert(target, a, b, chain.newton_steps)
@@ -178,12 +186,15 @@ def newton_steps_for(chain: BezierChain, tolerance: float = 1e-14) -> int:
     return _MOST_NEWTON_STEPS
 
 
-def _step_sum(x: Any, passed: Sequence[Any], values: Sequence[Any]) -> Any:
-    """Return values[i] where x has passed i edges: a sum of steps works for all types."""
-    result = values[0] + 0 * x
-    for step, before, after in zip(passed, values[:-1], values[1:], strict=True):
-        result = result + step * (after - before)
-    return result
+def _step_sums(chain: BezierChain, rows: Sequence[Sequence[Any]], x: Any) -> list[Any]:
+    """Return row[i] of every row where x lies in piece i: a sum of steps works for all types."""
+    passed, sums = [x >= edge for edge in chain.x[1:-1]], []
+    for row in rows:
+        total = row[0] + 0 * x
+        for step, before, after in zip(passed, row[:-1], row[1:], strict=True):
+            total = total + step * (after - before)
+        sums.append(total)
+    return sums
 
 
 def _bernstein(u: Any, p0: Any, a: Any, b: Any, p5: Any) -> tuple[Any, Any, Any]:

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.conventions import Side
-from pathwalker_cli.stride.cycle import BOTH_SIDES, OwnCycle
+from pathwalker_cli.conventions import SIDES, Side
+from pathwalker_cli.stride.stride import OwnCycle
 
 __all__ = [
     "BODY_COLOUR",
@@ -116,9 +116,7 @@ def zero_line(ax: Axes) -> None:
 
 def side_handles() -> list[Artist]:
     """Return the legend entries of the two sides."""
-    return [
-        Line2D([], [], color=LINE_COLOUR[s], linestyle=LINE_STYLE[s], label=s) for s in BOTH_SIDES
-    ]
+    return [Line2D([], [], color=LINE_COLOUR[s], linestyle=LINE_STYLE[s], label=s) for s in SIDES]
 
 
 def events_handle() -> Artist:
@@ -128,7 +126,7 @@ def events_handle() -> Artist:
 
 def side_look(name: str) -> tuple[str, str]:
     """Return colour and marker of the side that a name tells of; grey triangles for none."""
-    side = next((side for side in BOTH_SIDES if side in name), None)
+    side = next((side for side in SIDES if side in name), None)
     return (LINE_COLOUR[side], MARKER[side]) if side else (NEUTRAL, "^")
 
 

@@ -30,8 +30,8 @@ from pathwalker_cli.studies.landscape.text import (
     landscape_lines,
     write_tables,
 )
+from pathwalker_cli.studies.measures import free_units, measures
 from pathwalker_cli.studies.neighbours import Neighbours, motion_distance, motion_signature
-from pathwalker_cli.studies.unknowns import further_units, numbers_of
 
 __all__ = [
     "STUDY",
@@ -255,7 +255,7 @@ def _result(
     """Return an exploration as plain numbers, with proofs of some of its points."""
     points, mesh = tuple(_points(graph, explored)), near.run.config.mesh
     best = min((p for p in points if p.branch == 1), key=lambda p: p.cost)
-    start = _point(ROOT, graph.points[ROOT], near.optimum.result, numbers_of(near.optimum))
+    start = _point(ROOT, graph.points[ROOT], near.optimum.result, measures(near.optimum))
     differs = study.side != "both" and best.cost < start.cost - _BETTER * abs(start.cost)
     attempts = [attempt.end.result for attempt in explored.attempts]
     return Landscape(
@@ -276,7 +276,7 @@ def _result(
         seconds=sum(result.seconds for result in attempts),
         sweeps=explored.sweeps,
         complete=explored.complete,
-        further=further_units(near.optimum.solver.walker.unknowns),
+        further=free_units(near.optimum.solver.walker.unknowns),
     )
 
 
@@ -294,7 +294,7 @@ def _released(near: Neighbours, side: str, best: Point, explored: Exploration[Op
     """Return where the best point ends with free springs."""
     branch = explored.best(best.name)
     end = near.resolve("released", near.run.case, None if branch is None else branch.end)
-    numbers = numbers_of(end) if end.converged else {}
+    numbers = measures(end) if end.converged else {}
     springs = tuple(numbers.get(f"{kind}_stiffness_{side}", float("nan")) for kind in _KINDS)
     return _point("released", springs, end.result, numbers)
 
@@ -304,7 +304,7 @@ def _points(graph: Graph, explored: Exploration[Optimum]) -> Iterator[Point]:
     for name, values in graph.points.items():
         for rank, branch in enumerate(explored.branches[name], start=1):
             end = branch.end
-            yield _point(name, values, end.result, numbers_of(end), rank, branch.times)
+            yield _point(name, values, end.result, measures(end), rank, branch.times)
         if not explored.branches[name]:
             last = [a.end.result for a in explored.attempts if a.point == name][-1]
             yield _point(name, values, last, {}, branch=0)

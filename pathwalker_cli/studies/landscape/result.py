@@ -27,7 +27,7 @@ class Point:
         status: "converged" or the reason why not.
         iterations: Iterations of the solve.
         seconds: Wall seconds of it.
-        measures: Numbers of `MEASURES`, SI units; none if it did not converge.
+        measures: Measures and free numbers, SI units; none if it did not converge.
         times: How many solves ended there.
     """
 

@@ -11,7 +11,7 @@ import numpy as np
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.studies.landscape.result import Landscape, Point, Region
-from pathwalker_cli.studies.unknowns import measures_with
+from pathwalker_cli.studies.measures import measures_with
 
 __all__ = ["FILES", "landscape_content", "landscape_lines", "write_tables"]
 

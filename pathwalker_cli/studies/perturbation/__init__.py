@@ -22,6 +22,7 @@ from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.fields import Quantity, invalid
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.results.run_folder import Run
+from pathwalker_cli.results.text import spring_ends
 from pathwalker_cli.studies.base import (
     NeighbourStudy,
     Plan,
@@ -29,6 +30,13 @@ from pathwalker_cli.studies.base import (
     Work,
     require_optimum,
     resolver_of,
+)
+from pathwalker_cli.studies.measures import (
+    Ranges,
+    free_units,
+    measures,
+    measures_with,
+    ranges_of,
 )
 from pathwalker_cli.studies.neighbours import Journal
 from pathwalker_cli.studies.perturbation.result import (
@@ -40,14 +48,6 @@ from pathwalker_cli.studies.perturbation.result import (
     perturbation_lines,
     remark,
     write_tables,
-)
-from pathwalker_cli.studies.unknowns import (
-    Ranges,
-    ends,
-    further_units,
-    measures_with,
-    numbers_of,
-    ranges_of,
 )
 
 __all__ = ["STUDY", "PerturbationStudy", "moved_numbers", "perturb"]
@@ -126,8 +126,8 @@ def perturb(study: PerturbationStudy, run: Run, work: Work) -> Perturbation:
     case = study.solved_as(run.case)
     resolver = resolver_of(run, study.tolerance)
     base = require_optimum(resolver, run, study.tolerance)
-    before, ranges = numbers_of(base), ranges_of(base)
-    further = further_units(base.solver.walker.unknowns)
+    before, ranges = measures(base), ranges_of(base)
+    further = free_units(base.solver.walker.unknowns)
     points = list(_points(study, case, moved_numbers(study, base.solver), before))
     rows = {}
     for point, optimum in _solved(points, Journal(work.folder / POINTS, run, resolver), base):
@@ -187,11 +187,11 @@ def _perturbed(
 ) -> Perturbed:
     """Return one neighbour in numbers."""
     unknown, factor, moved, case = point
-    values = numbers_of(optimum) if optimum.converged else {}
+    values = measures(optimum) if optimum.converged else {}
     changes = {k: value / before[k] - 1.0 for k, value in values.items() if before[k]}
     change = changes.get("cost", 0.0)
     falls = change < -_NOISE * tolerance
-    end = ends(before, ranges).get(unknown.name, "")
+    end = spring_ends(before, ranges).get(unknown.name, "")
     limits = ranges[unknown.name]
     note, explained = remark(end, moved, limits, change if falls else 0.0, unknown.unit)
     return Perturbed(

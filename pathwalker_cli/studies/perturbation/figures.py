@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -24,7 +24,8 @@ from pathwalker_cli.stride.figures.style import (
     new_figure,
     side_look,
 )
-from pathwalker_cli.studies.measures import COMPARED, measure_of
+from pathwalker_cli.stride.measures import measure_of
+from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
 
 __all__ = ["perturbation_figure", "save_perturbation_figure"]
@@ -87,7 +88,7 @@ def _handles(result: Perturbation) -> list[Artist]:
     handles: list[Artist] = [
         Line2D([], [], color=LINE_COLOUR[side], marker=MARKER[side], markersize=4.5,
                label=f"{side} {result.noun} moved")
-        for side in reversed(BOTH_SIDES)
+        for side in reversed(SIDES)
     ]  # fmt: skip
     if any(row.changes_article for row in result.rows):
         handles.append(

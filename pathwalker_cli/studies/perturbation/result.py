@@ -11,8 +11,10 @@ from pathwalker_cli.case import Case
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import COMPARED, Measure, measure_of
-from pathwalker_cli.studies.unknowns import Ranges, ends, range_content
+from pathwalker_cli.results.text import spring_ends
+from pathwalker_cli.stride.measure import Measure
+from pathwalker_cli.stride.measures import measure_of
+from pathwalker_cli.studies.measures import COMPARED, Ranges, range_content
 
 __all__ = [
     "FILES",
@@ -210,7 +212,7 @@ def perturbation_content(result: Perturbation) -> dict[str, Any]:
         "seconds": result.seconds,
         "optimum": result.optimum,
         **range_content(result.ranges),
-        "at_limit": ends(result.optimum, result.ranges),
+        "at_limit": spring_ends(result.optimum, result.ranges),
         "rows": [row.content() for row in result.rows],
     }
 

@@ -17,9 +17,10 @@ from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.fields import AS_TUPLE, invalid
 from pathwalker_cli.results.run_folder import Run, load_run, write_run
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.base import NeighbourStudy, Plan, StudyKind, Work
 from pathwalker_cli.studies.branches import Branch, Exploration, Graph, Rules, Values, explore
-from pathwalker_cli.studies.measures import MEASURES
+from pathwalker_cli.studies.measures import free_units, measures
 from pathwalker_cli.studies.neighbours import Neighbours, motion_signature
 from pathwalker_cli.studies.run import done_run
 from pathwalker_cli.studies.tradeoff.result import (
@@ -32,7 +33,6 @@ from pathwalker_cli.studies.tradeoff.result import (
     tradeoff_lines,
     write_tables,
 )
-from pathwalker_cli.studies.unknowns import further_units, numbers_of
 
 __all__ = ["STUDY", "TradeoffStudy", "chain", "tradeoff_of"]
 
@@ -132,7 +132,7 @@ def _point(weight: float, branches: Sequence[Branch[Optimum]]) -> FrontPoint:
         status=best.result.status,
         mesh="inaccurate" if rough else "base",
         dominated=None,
-        measures=numbers_of(best),
+        measures=measures(best),
         errors=(position, velocity),
         intervals=best.motion.intervals,
         cost_on_base_mesh=best.cost,
@@ -164,9 +164,11 @@ class _Refined:
         )
         if metrics["status"] != "converged":
             return replace(point, status=f"on a finer mesh: {metrics['status']}")
-        numbers = {m.key: metrics[m.key] for m in MEASURES if metrics.get(m.key) is not None}
+        numbers = {
+            m.key: metrics[m.key] for m in measures_in("studies") if metrics.get(m.key) is not None
+        }
         unknowns = optimum.solver.walker.unknowns
-        for name in further_units(unknowns):
+        for name in free_units(unknowns):
             which = [unknown.name for unknown in unknowns].index(name)
             numbers[name] = float(run.motion.parameters[which])
         return replace(
@@ -190,7 +192,7 @@ def _result(
         condition=config.condition,
         points=points,
         base_weight=config.cost.walking_speed_weight,
-        optimum=numbers_of(near.optimum),
+        optimum=measures(near.optimum),
         front=front_of(points),
         recorded_walking_speed=None
         if recorded is None
@@ -203,7 +205,7 @@ def _result(
         seconds_refined=seconds_refined,
         sweeps=explored.sweeps,
         sweeps_found_nothing_new=explored.complete,
-        further=further_units(solver.walker.unknowns),
+        further=free_units(solver.walker.unknowns),
     )
 
 

@@ -24,7 +24,7 @@ from pathwalker_cli.stride.figures.style import (
     legend,
     new_figure,
 )
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
 __all__ = ["save_tradeoff_figure", "tradeoff_figure"]

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, PlainSerializer, TypeAdapter
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.unknowns import measures_with
+from pathwalker_cli.studies.measures import measures_with
 
 __all__ = [
     "FILES",

@@ -23,6 +23,7 @@ from pathwalker_cli.studies.base import (
     require_optimum,
     resolver_of,
 )
+from pathwalker_cli.studies.measures import free_units, measures, measures_with, ranges_of
 from pathwalker_cli.studies.neighbours import Solved, solve_all
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, draw, inputs_of
 from pathwalker_cli.studies.uncertainty.result import (
@@ -32,7 +33,6 @@ from pathwalker_cli.studies.uncertainty.result import (
     uncertainty_lines,
     write_tables,
 )
-from pathwalker_cli.studies.unknowns import further_units, measures_with, numbers_of, ranges_of
 
 __all__ = ["STUDY", "UncertaintyStudy", "draw_cases", "uncertainty"]
 
@@ -121,7 +121,7 @@ def uncertainty(study: UncertaintyStudy, run: Run, work: Work) -> Uncertainty:
     counted = _counted(study.draws, work.report)
     folder = work.folder / DRAWS
     solved = solve_all(cases, run, folder, study.tolerance, work.workers, counted)
-    numbers, further = numbers_of(base), further_units(base.solver.walker.unknowns)
+    numbers, further = measures(base), free_units(base.solver.walker.unknowns)
     return Uncertainty(
         config=case.config,
         patient=case.unvaried.id,

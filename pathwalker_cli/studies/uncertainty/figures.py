@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -28,8 +27,8 @@ from pathwalker_cli.stride.figures.style import (
     new_figure,
     side_look,
 )
+from pathwalker_cli.studies.measures import Ranges
 from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
-from pathwalker_cli.studies.unknowns import Ranges
 
 __all__ = ["correlation_figure", "save_uncertainty_figures", "spread_figure"]
 
@@ -137,7 +136,7 @@ def _handles(count: int) -> list[Artist]:
     point: dict[str, Any] = {"color": NEUTRAL, "linewidth": 0}
     sides: list[Artist] = [
         Line2D([], [], color=LINE_COLOUR[s], marker=MARKER[s], linewidth=0, markersize=4.5, label=s)
-        for s in reversed(BOTH_SIDES)
+        for s in reversed(SIDES)
     ]
     return [
         *sides,

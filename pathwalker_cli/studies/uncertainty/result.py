@@ -18,10 +18,11 @@ from scipy import stats
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import Measure
+from pathwalker_cli.results.text import spring_ends
+from pathwalker_cli.stride.measure import Measure
+from pathwalker_cli.studies.measures import Ranges, range_content
 from pathwalker_cli.studies.neighbours import Solved
 from pathwalker_cli.studies.uncertainty.draws import Draws, Input
-from pathwalker_cli.studies.unknowns import Ranges, ends, range_content
 
 __all__ = [
     "FILES",
@@ -38,7 +39,7 @@ __all__ = [
 
 FILES: Final = ("draws.csv", "uncertainty.csv", "correlations.csv", "uncertainty.json")
 
-_DIGITS: Final = {"N m/rad": 1, "deg": 1, "m": 3, "m/s": 3, "s": 3, "s/m": 3, "1": 4}
+_DIGITS: Final = {"N m/rad": 1, "deg": 1, "m": 3, "m/s": 3, "s": 3, "s/m": 3, "": 4}
 """Digits after the point by unit shown; of others three."""
 
 _LISTED: Final = 5
@@ -95,7 +96,7 @@ class Uncertainty:
         """Return a measure of all converged draws; at a limit, the limit itself, shape (n,)."""
         values = []
         for end in self.converged:
-            at = ends(end.values, self.ranges).get(key)
+            at = spring_ends(end.values, self.ranges).get(key)
             limit = None if at is None else self.ranges[key][at == "upper"]
             values.append(end.values[key] if limit is None else limit)
         return np.array(values)
@@ -278,7 +279,7 @@ def uncertainty_lines(result: Uncertainty) -> Iterator[str]:
 
 def _row(spread: Spread) -> str:
     measure = spread.measure
-    unit = "" if measure.unit == "1" else f" [{measure.shown_unit}]"
+    unit = f" [{measure.shown_unit}]" if measure.shown_unit else ""
     low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
     strength = "" if spread.strength is None else f"{spread.strength:+.2f}"
     base, label = shown_text(measure, spread.base), f"{measure.label}{unit}"
@@ -287,7 +288,7 @@ def _row(spread: Spread) -> str:
 
 def shown_text(measure: Measure, value: float) -> str:
     """Return a value of a measure in the unit for people."""
-    return f"{measure.shown(value):.{_DIGITS.get(measure.shown_unit, 3)}f}"
+    return f"{measure.in_shown_unit(value):.{_DIGITS.get(measure.shown_unit, 3)}f}"
 
 
 def _line(label: str, base: str, middle: str, span: str, place: str, strength: str) -> str:
