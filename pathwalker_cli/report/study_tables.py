@@ -18,6 +18,7 @@ from pathwalker_cli.report.study_files import Spreads, landscape_of, spreads_of
 from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.landscape.figures import Chosen
 from pathwalker_cli.studies.measures import COMPARED
+from pathwalker_cli.studies.registry import STUDIES
 from pathwalker_cli.studies.sensitivity.result import label_of
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, tradeoff_of_content
 from pathwalker_cli.studies.uncertainty.result import Spread, shown_text
@@ -46,10 +47,16 @@ def study_section(study: Study, run: ReportRun) -> Section:
         "uncertainty": _uncertainty,
     }
     try:
-        return make[study.kind](study, run)
+        return make.get(study.kind, _other)(study, run)
     except (LookupError, TypeError, AttributeError, ValueError, StopIteration) as problem:
         what = f"does not hold what `pathwalker {study.kind}` writes: {problem!r}"
         raise DataError(what, where=str(study.folder), mend="make the study again") from None
+
+
+def _other(study: Study, run: ReportRun) -> Section:
+    """Return where the numbers of a study stand that pages draw no table of."""
+    entry = STUDIES[study.kind]
+    return Section(entry.heading, (f"{entry.title} Its numbers: {study.folder / entry.summary}.",))
 
 
 def _sensitivity(study: Study, run: ReportRun) -> Section:
