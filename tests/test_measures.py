@@ -27,7 +27,7 @@ from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import REGISTRY, TABLES, expanded, measures_in, metrics_of
 from pathwalker_cli.stride.stride import NotKnownError, stride_of
 from pathwalker_cli.studies.batch.cases import BatchCase
-from pathwalker_cli.studies.batch.table import CaseTable
+from pathwalker_cli.studies.batch.ledger import CaseTable
 from pathwalker_cli.studies.landscape import text as landscape
 from pathwalker_cli.studies.measures import all_measures, measures
 from pathwalker_cli.studies.sensitivity.result import (

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.case import Case
+from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
@@ -89,7 +90,7 @@ class Perturbed:
     def content(self) -> dict[str, Any]:
         """Return it as plain values; what is no spring has its unit beside it."""
         plain = {key: value for key, value in vars(self).items() if key not in _ABOUT}
-        if self.spring:
+        if self.name in STIFFNESSES:
             return {"spring": self.name, "factor": self.factor, "stiffness": self.value, **plain}
         about = {"number": self.name, "factor": self.factor, "value": self.value}
         return {**about, "label": self.label, "unit": self.unit, **plain}

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.errors import InputError, PatientError
+from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.fields import Quantity
 from pathwalker_cli.results.run_folder import Run
@@ -77,6 +78,8 @@ def draw_cases(case: Case, draws: Draws) -> list[Case]:
         drawn = replace(case, config=case.config.model_copy(update={"variation": variation}))
         try:
             _ = drawn.patient
+            if drawn.config.free:  # what is drawn may leave a range that no orthosis can have
+                _ = gait_bounds(drawn.walker(), drawn.config.bounds, drawn.config.free)
         except InputError as error:
             raise PatientError(
                 f"draw {number} gives a patient who is refused: {error.what}",
