@@ -118,7 +118,7 @@ def test_standing_points_stay_on_the_ground_and_where_they_are(frames: GaitFrame
     for name in PHASE_NAMES:
         rows = np.flatnonzero(np.array(frames.phase) == name)
         for point in phase_named(name).points:
-            x, z = frames.points[point][rows].T
+            x, z = frames.points[point.name][rows].T
             assert np.abs(z).max() < SPREAD
             assert np.ptp(x) < SPREAD
 
