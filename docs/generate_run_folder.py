@@ -1,16 +1,14 @@
 """Write `run-folder.md`: every file of a run folder, every column and every key of `metrics.json`.
 
-Columns come from the tables that are written, keys of the gait from the docstring of its metrics.
+Columns come from the tables that are written, keys of the gait from the registry of measures.
 
 python docs/generate_run_folder.py
 """
 
 from __future__ import annotations
 
-import inspect
 import re
 from collections.abc import Iterator
-from dataclasses import fields
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
@@ -22,8 +20,9 @@ from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, 
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.results.run_folder import ENTRIES
 from pathwalker_cli.results.tables import controls_table, forces_table, states_table, torques_table
+from pathwalker_cli.stride import measures
 from pathwalker_cli.stride.figures import FIGURES
-from pathwalker_cli.stride.metrics import GaitMetrics
+from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.series import GaitSeries
 
 PAGE: Final = Path(__file__).with_name("run-folder.md")
@@ -131,6 +130,7 @@ PROOF: Final = {
     "shortfall": "of a run that found no motion: whether muscles of any strength walk within the bounds, and the "
     "torques [N m] that the muscles lack, with strength and percent of the stride; otherwise null",
     "active_bounds": "names of the bounds that hold the solution back, with value and phases",
+    "active": "the same bounds typed: `name`, `side` (`lower` or `upper`), `value`, `places` (phases)",
     "stiffness_ranges": "by stiffness, allowed range [N m/rad]",
     "unknowns": "every number that was free to choose, in the order of `parameters` in `motion.npz`: name, place in the "
     "patient's file, value, unit and range [SI]",
@@ -187,13 +187,8 @@ def page() -> str:
 
 
 def gait_keys() -> dict[str, str]:
-    """Return the keys that describe the gait and what the docstring says of them."""
-    arguments = inspect.getdoc(GaitMetrics).partition("Args:\n")[2]  # type: ignore[union-attr]
-    entries = re.findall(r"^ {4}(\w+): (.*?)(?=^ {4}\w|\Z)", arguments, re.MULTILINE | re.DOTALL)
-    texts = {name: " ".join(text.split()) for name, text in entries}
-    return {
-        _key(field.name, field.type): _sentence(texts[field.name]) for field in fields(GaitMetrics)
-    }
+    """Return the keys that describe the gait, a star for the side, and what they mean."""
+    return {m.family: _meaning(m) for m in measures.REGISTRY if m.kept and m.value is not None}
 
 
 def expanded(key: str) -> tuple[str, ...]:
@@ -201,22 +196,12 @@ def expanded(key: str) -> tuple[str, ...]:
     return tuple(key.replace("*", side) for side in SIDES) if "*" in key else (key,)
 
 
-def _key(name: str, kind: Any) -> str:
-    """Return the key of a metric, with a star for the side."""
-    if not str(kind).startswith("PerSide"):
-        return name
-    stem = name.removesuffix("_body_weights")
-    return f"{stem}_*{name.removeprefix(stem)}"
-
-
-def _sentence(text: str) -> str:
-    """Return a docstring's words as a cell: without what the star says, linked where a page tells more."""
-    text = text.removeprefix("Per side, ").rstrip(".").replace("None when", "`null` when")
-    text = text.replace(
-        "see `ankle_profile.ankle_torque_slope`",
-        "slope of net ankle torque over dorsiflexion while flat or on the toe",
-    )
-    return text[0].lower() + text[1:] if not text.startswith("K_") else text
+def _meaning(measure: Measure) -> str:
+    """Return what a measure is, with its unit behind its first words."""
+    if measure.unit in ("1", "body weights"):
+        return measure.meaning
+    first, mark, more = re.fullmatch(r"([^;:]*)([;:]?)(.*)", measure.meaning).groups()  # type: ignore[union-attr]
+    return f"{first} [{measure.unit}]{mark}{more}"
 
 
 def _key_table(keys: dict[str, str]) -> str:

@@ -14,16 +14,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.integrate import trapezoid
 from scipy.interpolate import CubicSpline
 
-from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, Condition
-from pathwalker_cli.evaluation.gait import Gait
+from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, SIDES, Condition
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.stride import Stride, phase_stances
 
 PUBLISHED = Path(__file__).parents[2] / "shared" / "published"
 needs_published = pytest.mark.skipif(
@@ -90,45 +88,45 @@ def published_walker(condition: Condition) -> Walker:
     return build_walker(load_patient("sreenivasa2017-patient"), condition, published=True)
 
 
-def sparse_gait(problem: str) -> Gait:
+def sparse_gait(problem: str) -> Stride:
     """Return a published gait at a few instants."""
     phases, times, poses = zip(*INSTANTS[problem], strict=True)
     durations = np.array(DURATIONS[problem])
     end = np.array(poses[0])
     end[0] = DISTANCE[problem]
-    return Gait(
+    return Stride(
         name=problem,
         problem=problem,
         walker=published_walker("orthosis" if "orthosis" in problem else "barefoot"),
         time=np.array([*times, durations.sum()]),
         phase=(*phases, PHASE_NAMES[-1]),
-        phase_durations=durations,
+        stances=phase_stances(durations),
         q=np.vstack([*poses, end]),
     )
 
 
 @cache
-def published_gait(problem: str) -> Gait:
+def published_gait(problem: str) -> Stride:
     """Return a published gait from its files: every row, with forces and torques of LS-Barefoot."""
     table = _table(PUBLISHED / problem / "pathWalker2d.csv")
     time, q = table[:, 0], table[:, 1:]
     counts = [ROWS_PER_INTERVAL * n + 1 for n in INTERVALS[problem]]
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     switching = np.append(time[starts], time[-1])
-    known = _augmented(time) if problem == "ls-barefoot" else {}
-    return Gait(
+    known = _augmented(time.size) if problem == "ls-barefoot" else {}
+    return Stride(
         name=problem,
         problem=problem,
         walker=published_walker("orthosis" if "orthosis" in problem else "barefoot"),
         time=time,
         phase=tuple(np.repeat(PHASE_NAMES, counts)),
-        phase_durations=np.diff(switching),
+        stances=phase_stances(np.diff(switching)),
         q=q,
         **known,
     )
 
 
-def _augmented(time: np.ndarray) -> dict[str, Any]:
+def _augmented(rows: int) -> dict[str, Any]:
     """Return activations, torques and forces of the published LS-Barefoot solution."""
     table = np.loadtxt(
         PUBLISHED / "ls-barefoot" / "pathWalker2d_augmented.txt", delimiter=",", usecols=range(91)
@@ -137,16 +135,15 @@ def _augmented(time: np.ndarray) -> dict[str, Any]:
     activation, torque = parts[2], parts[4]
     points = parts[7].reshape(-1, 4, 3)[:, :, [0, 2]]
     assert len(CONTACT_FORCES) == points[0].size
-    tau = np.zeros((time.size, 10))
+    tau = np.zeros((rows, 10))
     for i, muscle in enumerate(generators()):
         tau[:, COORDINATES.index(muscle.coordinate)] += torque[:, i]
     return {
         "force": {side: points[:, 2 * i : 2 * i + 2].sum(axis=1)
-                  for i, side in enumerate(BOTH_SIDES)},
+                  for i, side in enumerate(SIDES)},
         "net_torque": tau,
         "muscle_torque": torque,
         "activation": activation,
-        "effort": float(trapezoid((activation**2).sum(axis=1), time)),
     }  # fmt: skip
 
 
@@ -160,7 +157,7 @@ def _table(path: Path) -> np.ndarray:
     return np.array(rows)
 
 
-def sampled_gait() -> Gait:
+def sampled_gait() -> Stride:
     """Return the angles of the published MAPD-Orthosis gait from the instants kept here."""
     time = np.linspace(0.0, SAMPLED_END, 2000)
     q = np.zeros((time.size, 10))

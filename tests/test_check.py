@@ -22,7 +22,7 @@ from pathwalker_cli.config import load_config, smoke_version
 from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results.orthosis_text import orthosis_rows
+from pathwalker_cli.results.text import orthosis_rows
 
 PATIENT = "sreenivasa2017-patient"
 

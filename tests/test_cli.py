@@ -31,8 +31,9 @@ from pathwalker_cli.ocp.violations import Violation
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import ENTRIES, load_run, write_run
-from pathwalker_cli.stride.metrics import gait_metrics
+from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import gait_series
+from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.studies import run as study_run
 from test_verdict import verdict
 
@@ -602,7 +603,7 @@ def test_the_smoke_solution_proves_itself(smoke: Smoke) -> None:
 @pytest.mark.xdist_group("smoke")
 def test_the_smoke_motion_gives_the_same_metrics_again(smoke: Smoke) -> None:
     loaded = load_run(smoke[0])
-    again = gait_metrics(gait_series(walker_of("orthosis"), loaded.motion)).as_dict()
+    again = metrics_of(stride_of(gait_series(walker_of("orthosis"), loaded.motion)))
     assert json.loads(json.dumps(again)) == {key: loaded.metrics[key] for key in again}
 
 

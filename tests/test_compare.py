@@ -15,15 +15,15 @@ from click.testing import CliRunner, Result
 from conftest import MadeSolution
 from pathwalker_cli.cli import cli
 from pathwalker_cli.evaluation import figures
-from pathwalker_cli.evaluation.quantities import quantity_of
+from pathwalker_cli.evaluation.curves import Trace, traces
 from pathwalker_cli.evaluation.run import gaits_of_runs
-from pathwalker_cli.evaluation.text import number_text
-from pathwalker_cli.evaluation.traces import lone_trace, traces
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.report.compare import Compared, compare_runs
-from pathwalker_cli.report.compare_text import comparison_lines
+from pathwalker_cli.report.compare import Compared, compare_runs, comparison_lines
+from pathwalker_cli.results.metrics import RunMetrics
+from pathwalker_cli.results.run_folder import load_run
+from pathwalker_cli.stride.measures import measure_of
 from report_runs import write_made_run
 
 CHILD = Path(__file__).parent / "data" / "child-10y" / "patient.yaml"
@@ -70,7 +70,7 @@ def test_differences_are_to_the_first_run(runs: Path) -> None:
     folders = [runs / name for name in ("mapd-barefoot", "mapd-orthosis", "child")]
     found = compare_runs(folders)
     metrics = [json.loads((folder / "metrics.json").read_text()) for folder in folders]
-    rows = {row.quantity.key: row for row in found.rows}
+    rows = {row.measure.key: row for row in found.rows}
     cost = rows["cost"]
     assert cost.values == (0.4, 0.4, 0.5)
     assert cost.differences[1:] == pytest.approx((0.0, 0.1))
@@ -83,10 +83,10 @@ def test_differences_are_to_the_first_run(runs: Path) -> None:
 
 
 def test_a_share_is_one_of_the_size_of_the_first_value(runs: Path) -> None:
-    quantity = compare_runs([runs / "mapd-barefoot", runs / "child"]).rows[0].quantity
-    assert Compared(quantity, (-2.0, -3.0)).shares == (0.0, -0.5)
-    assert Compared(quantity, (0.0, 1.0)).shares == (None, None)
-    assert Compared(quantity, (None, 1.0)).shares == (None, None)
+    measure = compare_runs([runs / "mapd-barefoot", runs / "child"]).rows[0].measure
+    assert Compared(measure, (-2.0, -3.0)).shares == (0.0, -0.5)
+    assert Compared(measure, (0.0, 1.0)).shares == (None, None)
+    assert Compared(measure, (None, 1.0)).shares == (None, None)
 
 
 def test_two_runs_fit_into_80_columns(runs: Path) -> None:
@@ -139,7 +139,7 @@ def test_files_and_figures(runs: Path, tmp_path: Path) -> None:
 
 def test_goals_are_compared(runs: Path) -> None:
     found = compare_runs([runs / "mapd-barefoot", runs / "child"])
-    rows = {row.quantity.key: row for row in found.rows}
+    rows = {row.measure.key: row for row in found.rows}
     told = [
         json.loads((runs / name / "metrics.json").read_text())["goals"]
         for name in ("mapd-barefoot", "child")
@@ -169,7 +169,7 @@ def test_what_means_something_else_has_no_difference(
     )  # fmt: skip
     found = compare_runs([runs / "mapd-orthosis", other])
     silent = {
-        row.quantity.key
+        row.measure.key
         for row in found.rows
         if None not in row.values and row.differences[1] is None
     }
@@ -186,7 +186,7 @@ def test_fits_and_predictions_have_other_costs(
 ) -> None:
     fit = write_made_run(tmp_path / "fit", made_solution, "ls-barefoot")
     (cost,) = (
-        r for r in compare_runs([runs / "mapd-barefoot", fit]).rows if r.quantity.key == "cost"
+        r for r in compare_runs([runs / "mapd-barefoot", fit]).rows if r.measure.key == "cost"
     )
     assert cost.differences[1] is None
 
@@ -197,9 +197,9 @@ def test_words_for_people(made_solution: MadeSolution, runs: Path, tmp_path: Pat
     output = compare(runs / "mapd-orthosis", other).output
     assert " verdict: yes (mapd-orthosis), no (other)" in output
     assert "-0.0 " not in output
-    quantity = quantity_of("step_length_left")
-    assert number_text(-1e-9, quantity, sign=True) == "+0.000"
-    assert number_text(-0.001, quantity) == "-0.001"
+    measure = measure_of("step_length_left")
+    assert measure.text(-1e-9, sign=True) == "+0.000"
+    assert measure.text(-0.001) == "-0.001"
 
 
 @pytest.mark.usefixtures("no_figures")
@@ -231,7 +231,7 @@ def test_twenty_runs_look_different_and_one_alone_looks_like_its_sides(runs: Pat
     shown = traces([gait] * 20, [str(i) for i in range(20)])
     assert len({str(trace.look("right")) for trace in shown}) == 20
     assert all(trace.look("right") == trace.look("left") for trace in shown)
-    alone = lone_trace(gait)
+    alone = Trace(gait, gait.problem)
     assert alone.look("right") != alone.look("left")
     assert alone.look("right")["linestyle"] != alone.look("left")["linestyle"]
 
@@ -252,6 +252,13 @@ def test_labels_are_never_formulas_nor_hidden(runs: Path) -> None:
     ids=str,
 )
 def test_an_active_bound_comes_back_from_its_text(bound: ActiveBound) -> None:
-    assert ActiveBound.parse(str(bound)) == bound
-    with pytest.raises(ValueError, match="is no active bound"):
-        ActiveBound.parse("knee")
+    assert ActiveBound.parsed(str(bound)) == bound
+    assert ActiveBound.parsed("knee") is None
+
+
+def test_active_bounds_of_older_runs_are_read_from_their_text(runs: Path) -> None:
+    run = load_run(runs / "mapd-orthosis")
+    older = RunMetrics.model_validate({k: v for k, v in run.metrics.items() if k != "active"})
+    assert older.active is None
+    assert older.bounds == run.result.bounds
+    assert run.result.bounds[0] == ActiveBound("knee_l", "lower", 0.264, ("left_toe",))

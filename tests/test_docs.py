@@ -25,8 +25,8 @@ from pathwalker_cli.io.yaml_file import read_mapping, validate
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.patient import OrthosisData
 from pathwalker_cli.problems import PROBLEMS
-from pathwalker_cli.results.orthosis_text import angle_words
-from pathwalker_cli.results.run_metrics import RunInputs, run_metrics
+from pathwalker_cli.results.metrics import RunInputs, run_metrics
+from pathwalker_cli.results.text import angle_words
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -116,7 +116,7 @@ def test_run_folder_names_every_key_of_the_metrics(made_solution: MadeSolution) 
     groups = (page.OUTCOME, page.gait_keys(), page.PROOF, page.ORIGIN)
     told = {key for group in groups for name in group for key in page.expanded(name)}
     for problem in PROBLEMS:
-        written = set(run_metrics(made_solution(problem), RunInputs({})))
+        written = set(run_metrics(made_solution(problem), RunInputs({})).content())
         assert told == written | {"verdict", "motion_hash", "multipliers_hash", "metrics_hash"}
 
 

@@ -11,32 +11,32 @@ import numpy as np
 import pytest
 
 from helpers import stylised_series, walker_of
-from pathwalker_cli.conventions import Condition
+from pathwalker_cli.conventions import SIDES, Condition
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.evaluation.angle_rms import (
+from pathwalker_cli.evaluation.differences import (
+    FORCE_RMS,
     JOINTS,
+    force_rms,
     recorded_rms_mean_cycle,
     recorded_rms_one_trial,
     rms_mean_cycle,
     rms_one_trial,
 )
-from pathwalker_cli.evaluation.ankle import ankle_line, ankle_profile, recorded_ankle_profiles
-from pathwalker_cli.evaluation.evaluate import Evaluation, evaluate_gait, gait_changes
-from pathwalker_cli.evaluation.force_rms import FORCE_RMS, force_rms
-from pathwalker_cli.evaluation.gait import Gait
-from pathwalker_cli.evaluation.numbers import gait_numbers, recorded_numbers
+from pathwalker_cli.evaluation.evaluate import Evaluation, compared, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.paper import paper_number
-from pathwalker_cli.evaluation.quantities import CHANGES, QUANTITIES
-from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
-from pathwalker_cli.evaluation.reference import article_stride, reference_stride
-from pathwalker_cli.evaluation.run import gait_of_series
-from pathwalker_cli.evaluation.spread import Spread, spread
-from pathwalker_cli.inverse.bands import POINTS
+from pathwalker_cli.evaluation.recorded import (
+    RecordedGait,
+    Spread,
+    article_stride,
+    recorded_gait,
+    recorded_numbers,
+    reference_stride,
+    spread,
+)
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.stride.cycle import BOTH_SIDES
-from pathwalker_cli.stride.metrics import gait_metrics
-from pathwalker_cli.trajectory import Trajectory
+from pathwalker_cli.stride.measures import ankle_line, measures_in, metrics_of
+from pathwalker_cli.stride.stride import POINTS, NotKnownError, Stride, stride_of
 from published_motions import needs_published, published_gait, sampled_gait, sparse_gait
 
 CHILD = Path(__file__).parent / "data" / "child-10y"
@@ -66,15 +66,21 @@ def recordings(condition: Condition) -> RecordedGait:
 
 
 @cache
-def made_gait(condition: Condition = "orthosis") -> Gait:
+def made_gait(condition: Condition = "orthosis") -> Stride:
     """Return the stylised gait."""
-    return gait_of_series(stylised_series(condition), "made", f"mapd-{condition}", effort=0.5)
+    return stride_of(stylised_series(condition), "made", f"mapd-{condition}")
 
 
 @cache
 def made_evaluation(condition: Condition) -> Evaluation:
     """Return the stylised gait beside the recordings."""
     return evaluate_gait(made_gait(condition), recorded=recordings(condition))
+
+
+def numbers_of(gait: Stride) -> dict[str, float]:
+    """Return what a gait says by itself, by key beside recordings."""
+    values = {measure.key: measure.of(gait) for measure in measures_in("evaluate")}
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def degrees(found: dict[str, float]) -> list[float]:
@@ -87,7 +93,7 @@ def degrees(found: dict[str, float]) -> list[float]:
 
 @pytest.mark.parametrize("problem", PREDICTIONS)
 def test_a_few_published_instants_give_the_printed_steps_and_speed(problem: str) -> None:
-    numbers = gait_numbers(sparse_gait(problem))
+    numbers = numbers_of(sparse_gait(problem))
     for quantity in ("step_length_left", "step_length_right", "walking_speed"):
         printed = paper_number(problem, quantity)
         assert printed is not None
@@ -99,7 +105,7 @@ def test_a_few_published_instants_give_the_printed_steps_and_speed(problem: str)
 
 
 def test_a_few_published_instants_give_step_lengths_and_speeds() -> None:
-    barefoot, orthosis = (gait_numbers(sparse_gait(problem)) for problem in PREDICTIONS)
+    barefoot, orthosis = (numbers_of(sparse_gait(problem)) for problem in PREDICTIONS)
     assert barefoot["step_length_left"] == pytest.approx(0.3740, abs=5e-5)
     assert barefoot["step_length_right"] == pytest.approx(0.2985, abs=5e-5)
     assert barefoot["walking_speed"] == pytest.approx(0.6098, abs=5e-5)
@@ -111,12 +117,12 @@ def test_a_few_published_instants_give_step_lengths_and_speeds() -> None:
 @pytest.mark.parametrize(
     "gait_of", [sparse_gait, pytest.param(published_gait, marks=needs_published)]
 )
-def test_published_knees_extend_as_the_article_says(gait_of: Callable[[str], Gait]) -> None:
-    barefoot, orthosis = (gait_numbers(gait_of(problem)) for problem in PREDICTIONS)
+def test_published_knees_extend_as_the_article_says(gait_of: Callable[[str], Stride]) -> None:
+    barefoot, orthosis = (numbers_of(gait_of(problem)) for problem in PREDICTIONS)
     key = "min_stance_knee_flexion"
-    found = [np.rad2deg(x[f"{key}_{side}"]) for x in (barefoot, orthosis) for side in BOTH_SIDES]
+    found = [np.rad2deg(x[f"{key}_{side}"]) for x in (barefoot, orthosis) for side in SIDES]
     np.testing.assert_allclose(found, [34.37, 34.38, 25.11, 26.07], atol=5e-3)
-    for side, change in zip(BOTH_SIDES, (-9.26, -8.30), strict=True):
+    for side, change in zip(SIDES, (-9.26, -8.30), strict=True):
         difference = orthosis[f"{key}_{side}"] - barefoot[f"{key}_{side}"]
         assert np.rad2deg(difference) == pytest.approx(change, abs=5e-3)
         printed = paper_number("change", f"{key}_{side}")
@@ -160,14 +166,14 @@ def test_what_the_article_says_it_compared_with_gives_other_numbers(problem: str
 @needs_published
 def test_published_files_agree_with_the_instants_kept_here() -> None:
     for problem in PREDICTIONS:
-        full, sparse = gait_numbers(published_gait(problem)), gait_numbers(sparse_gait(problem))
+        full, sparse = numbers_of(published_gait(problem)), numbers_of(sparse_gait(problem))
         for key, value in sparse.items():
             assert full[key] == pytest.approx(value, abs=2e-5), key
 
 
 @needs_published
 def test_published_fit_has_the_effort_and_forces_of_its_files() -> None:
-    numbers = gait_numbers(published_gait("ls-barefoot"))
+    numbers = numbers_of(published_gait("ls-barefoot"))
     assert numbers["effort_per_distance"] == pytest.approx(4.75, abs=5e-3)
     found = force_rms(published_gait("ls-barefoot"), recordings("barefoot"))
     # Printed: 68.24 N; which trials were averaged and how is not said.
@@ -178,22 +184,20 @@ def test_published_fit_has_the_effort_and_forces_of_its_files() -> None:
 # Closed form
 
 
-def shifted(offset: float) -> tuple[Gait, Trajectory]:
+def shifted(offset: float) -> Stride:
     """Return a gait whose angles lie a constant above a recorded stride [rad]."""
     stride = article_stride(recordings("barefoot"))
     assert stride is not None
-    motion = stride.motion
-    gait = replace(
+    return replace(
         sparse_gait("mapd-barefoot"),
-        time=motion.time,
-        phase=("right_flat",) * motion.time.size,
-        q=motion.values + offset,
+        time=stride.time,
+        phase=("right_flat",) * stride.time.size,
+        q=stride.q + offset,
     )
-    return gait, motion
 
 
 def test_a_constant_offset_is_its_own_rms_difference() -> None:
-    gait, _ = shifted(0.1)
+    gait = shifted(0.1)
     stride = article_stride(recordings("barefoot"))
     assert stride is not None
     found = rms_one_trial(gait, stride)
@@ -204,14 +208,13 @@ def test_a_constant_offset_is_its_own_rms_difference() -> None:
 def test_between_coarse_instants_angles_are_interpolated_and_after_the_end_they_stand() -> None:
     stride = article_stride(recordings("barefoot"))
     assert stride is not None
-    line = stride.motion.time[:, None] * np.ones(10)
-    ramp = replace(stride, motion=replace(stride.motion, values=line))
-    gait, _ = shifted(0.0)
+    ramp = replace(stride, q=stride.time[:, None] * np.ones(10))
+    gait = shifted(0.0)
     ends = gait.time[[0, -1]]
     straight = replace(gait, time=ends, phase=gait.phase[:2], q=ends[:, None] * np.ones(10))
     assert max(rms_one_trial(straight, ramp).values()) == pytest.approx(0.0, abs=1e-12)
     half = replace(straight, time=0.5 * ends, q=0.5 * straight.q)
-    beyond = np.maximum(stride.motion.time[:-4] - 0.5 * ends[1], 0.0)
+    beyond = np.maximum(stride.time[:-4] - 0.5 * ends[1], 0.0)
     expected = float(np.sqrt(np.mean(beyond**2)))
     assert rms_one_trial(half, ramp)["hip"] == pytest.approx(expected)
 
@@ -219,7 +222,7 @@ def test_between_coarse_instants_angles_are_interpolated_and_after_the_end_they_
 def test_stances_and_cycles_begin_with_the_strike_and_go_on_at_the_beginning() -> None:
     gait = made_gait()
     clock = gait.time[:, None]
-    for side in BOTH_SIDES:
+    for side in SIDES:
         cycle = gait.over_cycle(clock, side)[:, 0]
         assert cycle[0] == pytest.approx(gait.strike(side))
         assert cycle[-1] == pytest.approx(gait.strike(side))
@@ -256,13 +259,12 @@ def test_gaits_of_wrong_shape_are_refused() -> None:
 
 @pytest.mark.parametrize("condition", ["barefoot", "orthosis"])
 def test_numbers_are_those_of_the_run_itself(condition: Condition) -> None:
-    numbers, metrics = gait_numbers(made_gait(condition)), gait_metrics(stylised_series(condition))
-    own = metrics.as_dict()
+    numbers, own = numbers_of(made_gait(condition)), metrics_of(made_gait(condition))
     for key in ("walking_speed", "stride_time", "step_length_right", "step_length_left",
                 "stance_share_right", "stance_share_left", "min_stance_knee_flexion_right",
                 "min_stance_knee_flexion_left"):  # fmt: skip
         assert numbers[key] == pytest.approx(own[key], rel=1e-9), key
-    for side in BOTH_SIDES:
+    for side in SIDES:
         peak = own[f"peak_vertical_force_{side}_body_weights"]
         assert numbers[f"peak_vertical_force_{side}"] == pytest.approx(peak)
         extension = f"ankle_extension_{side[0]}"
@@ -283,7 +285,7 @@ def test_recorded_numbers_are_those_of_the_patients_file() -> None:
         assert known is not None
         block = known[condition]
         assert found["walking_speed"].mean == pytest.approx(block.walking_speed.mean, abs=6e-4)
-        for side in BOTH_SIDES:
+        for side in SIDES:
             steps = found[f"step_length_{side}"]
             limits = getattr(block.step_length, side)
             assert (steps.low, steps.high) == pytest.approx((limits.min, limits.max), abs=6e-4)
@@ -293,9 +295,9 @@ def test_measured_stances_alone_tell_of_forces_and_torques() -> None:
     counts = {"barefoot": (4, 5), "orthosis": (6, 7)}
     for condition, wanted in counts.items():
         found = recordings(condition)  # type: ignore[arg-type]
-        assert tuple(len(found.stance_forces(side)) for side in BOTH_SIDES) == wanted
-        assert tuple(len(recorded_ankle_profiles(found, side)) for side in BOTH_SIDES) == wanted
-        for side in BOTH_SIDES:
+        assert tuple(len(found.stance_forces(side)) for side in SIDES) == wanted
+        assert tuple(len(found.ankle_profiles(side)) for side in SIDES) == wanted
+        for side in SIDES:
             forces = found.stance_forces(side)
             assert forces.shape[1:] == (POINTS, 2)
             assert 0.8 < forces[:, :, 1].max() / found.walker.weight < 1.5
@@ -306,7 +308,7 @@ def test_the_mean_cycle_differs_from_itself_by_nothing() -> None:
     assert all(each.low > 0.0 for each in recorded_rms_mean_cycle(found).values())
     stride = reference_stride(found)
     assert stride is not None
-    assert stride.trial == "3053141"
+    assert stride.name == "3053141"
     assert recorded_rms_one_trial(found, stride)["knee"].count == 7
 
 
@@ -315,10 +317,10 @@ def test_the_reference_stride_begins_at_the_toe_off() -> None:
     own, article = reference_stride(found), article_stride(found)
     assert own is not None
     assert article is not None
-    assert own.motion.time.size == article.motion.time.size + 1
-    np.testing.assert_array_equal(own.motion.values[1:], article.motion.values)
+    assert own.time.size == article.time.size + 1
+    np.testing.assert_array_equal(own.q[1:], article.q)
     other = next(t.name for t in found.trials if t.name in ("3053173", "3053180", "3053182"))
-    assert other != own.trial
+    assert other != own.name
     with pytest.raises(DataError, match="no barefoot recording 'walk'; allowed: 3053171"):
         reference_stride(found, "walk")
 
@@ -329,7 +331,7 @@ def test_other_recordings_have_no_stride_of_the_article() -> None:
     assert article_stride(replace(found, walker=stranger)) is None
     named = reference_stride(replace(found, walker=stranger))
     assert named is not None
-    assert named.trial != "3053171"
+    assert named.name != "3053171"
 
 
 # The whole evaluation
@@ -338,8 +340,8 @@ def test_other_recordings_have_no_stride_of_the_article() -> None:
 @pytest.mark.parametrize("condition", ["barefoot", "orthosis"])
 def test_every_quantity_has_a_row(condition: Condition) -> None:
     evaluation = made_evaluation(condition)
-    keys = [row.quantity.key for row in evaluation.rows]
-    wanted = [q.key for q in QUANTITIES if condition == "orthosis" or "stiffness" not in q.key]
+    keys = [row.measure.key for row in evaluation.rows]
+    wanted = [m.key for m in compared() if condition == "orthosis" or "stiffness" not in m.key]
     assert keys == wanted
     for row in evaluation.rows:
         assert row.value is not None
@@ -364,8 +366,8 @@ def test_the_article_stands_beside_its_own_patient_and_problem() -> None:
 
 def test_changes_are_differences_of_values_and_of_recorded_means() -> None:
     barefoot, orthosis = made_evaluation("barefoot"), made_evaluation("orthosis")
-    changes = {change.quantity.key: change for change in gait_changes(barefoot, orthosis)}
-    assert list(changes) == [quantity.key for quantity in CHANGES]
+    changes = {change.measure.key: change for change in gait_changes(barefoot, orthosis)}
+    assert list(changes) == [m.key for m in measures_in("evaluate") if "stiffness" not in m.key]
     knee = changes["min_stance_knee_flexion_right"]
     assert knee.value == knee.orthosis - knee.barefoot
     # The patient walked with straighter knees in the orthoses.
@@ -391,13 +393,14 @@ def test_recordings_without_forces_still_tell_of_angles() -> None:
     evaluation = evaluate_gait(made_gait("barefoot"), recorded=replace(found, trials=blind))
     assert evaluation.row("rms_mean_cycle_knee").recorded is not None
     assert evaluation.row("peak_vertical_force_right").recorded is None
-    assert all(row.value is None for row in evaluation.rows if row.quantity.key in FORCE_RMS)
+    assert all(row.value is None for row in evaluation.rows if row.measure.key in FORCE_RMS)
     assert len(evaluation.notes) == 2
     assert all("not compared" in note for note in evaluation.notes)
 
 
 def test_a_motion_without_torques_gives_what_it_has() -> None:
-    numbers = gait_numbers(sparse_gait("mapd-orthosis"))
+    numbers = numbers_of(sparse_gait("mapd-orthosis"))
     assert "peak_vertical_force_right" not in numbers
     assert "effort_per_distance" not in numbers
-    assert ankle_profile(sparse_gait("mapd-orthosis"), "left") is None
+    with pytest.raises(NotKnownError):
+        sparse_gait("mapd-orthosis").ankle_profile("left")

@@ -32,8 +32,8 @@ from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.nlp import tape_store
 from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.metrics import run_inputs
 from pathwalker_cli.results.run_folder import claimed_run, load_run, release_runs, write_run
-from pathwalker_cli.results.run_metrics import run_inputs
 from pathwalker_cli.studies import journal
 from pathwalker_cli.studies import run as studies_run
 from pathwalker_cli.studies.base import claimed_folder

@@ -73,11 +73,10 @@ from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.blocks import OrthosisData
 from pathwalker_cli.results.motion_file import read_motion, write_motion
-from pathwalker_cli.results.orthosis_text import angle_words
-from pathwalker_cli.results.text import summary_rows
-from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
-from pathwalker_cli.stride.metrics import gait_metrics
+from pathwalker_cli.results.text import angle_words, summary_rows
+from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import gait_series
+from pathwalker_cli.stride.stride import own_cycle, stride_of
 from pathwalker_cli.trajectory import Trajectory
 
 SEEDS: Final = st.integers(0, 2**32 - 1)
@@ -299,7 +298,7 @@ def test_angles_come_back_from_degrees(angle: float) -> None:
 @given(stiffness=st.floats(1.0, 1000.0), share=st.floats(0.1, 10.0))
 def test_stiffness_per_degree_and_body_weights(stiffness: float, share: float) -> None:
     series = stylised_series()
-    found = gait_metrics(replace(series, force=share * series.force)).as_dict()
+    found = metrics_of(stride_of(replace(series, force=share * series.force)))
     for side in SIDES:
         force, weights = (found[f"peak_vertical_force_{side}{end}"] for end in ("", WEIGHTS_END))
         assert weights * found["body_weight"] == pytest.approx(force, rel=1e-12)
@@ -411,7 +410,7 @@ def test_percent_of_the_gait_cycle_is_time(durations: list[float]) -> None:
         replace(phase, duration=t) for phase, t in zip(series.motion.phases, durations, strict=True)
     )
     series = gait_series(series.walker, PhasedMotion(phases, series.motion.parameters))
-    for side in BOTH_SIDES:
+    for side in SIDES:
         cycle = own_cycle(series, side)
         assert (cycle.percent[0], cycle.percent[-1]) == (0.0, pytest.approx(100.0))
         assert (np.diff(cycle.percent) > -1e-9).all()

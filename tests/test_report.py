@@ -22,7 +22,6 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.config.values import changed_values, differing_values
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.evaluation.text import number_text
 from pathwalker_cli.inverse.study import load_inverse_dynamics
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report import figures
@@ -31,9 +30,9 @@ from pathwalker_cli.report.gait_page import gait_page
 from pathwalker_cli.report.html import page_html, page_of
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.springs import recommended, spring_section, verdict_words
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.landscape.files import write_landscape
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
-from pathwalker_cli.studies.measures import MEASURES
 from pathwalker_cli.studies.pool import Solved
 from pathwalker_cli.studies.tradeoff.files import write_tradeoff
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
@@ -201,13 +200,13 @@ def test_numbers_of_the_page_are_those_of_the_runs(runs: Path) -> None:
         ("effort_per_distance", "effort per distance"),
     ):
         barefoot, orthosis = (run.evaluation.row(key) for run in found)
-        assert rows[label][2] == number_text(barefoot.value, barefoot.quantity)
-        assert rows[label][5] == number_text(orthosis.value, orthosis.quantity)
+        assert rows[label][2] == barefoot.measure.text(barefoot.value)
+        assert rows[label][5] == orthosis.measure.text(orthosis.value)
         assert rows[label][4] == (barefoot.position or "")
         assert barefoot.value is not None
         assert orthosis.value is not None
         change = orthosis.value - barefoot.value
-        assert rows[label][8] == number_text(change, barefoot.quantity, sign=True)
+        assert rows[label][8] == barefoot.measure.text(change, sign=True)
     metrics = found[0].run.metrics
     shares = [metrics[f"stance_share_{side}"] for side in ("right", "left")]
     assert rows["stance share, left"][2] == f"{100 * shares[1]:.1f}"
@@ -494,7 +493,7 @@ def write_studies(folder: Path, run: Path, note: str = "") -> None:
     for name, content in contents.items():
         (folder / name).parent.mkdir(parents=True)
         (folder / name).write_text(json.dumps(content))
-    numbers = {measure.key: float(metrics[measure.key]) for measure in MEASURES}
+    numbers = {measure.key: float(metrics[measure.key]) for measure in measures_in("studies")}
     write_landscape(folder / "landscape", made_landscape(metrics, numbers))
     write_tradeoff(folder / "tradeoff", made_tradeoff(metrics, numbers))
     result = made_uncertainty(metrics, numbers)

@@ -118,6 +118,9 @@ def test_metrics_are_strict_json_with_the_keys_that_scripts_rely_on(run: Path) -
     assert metrics["reintegration_position_error"] == 5e-4
     assert metrics["dorsiflexion_stiffness_left"] == STIFFNESS[1]
     assert metrics["active_bounds"][0] == "knee_l lower 0.264 in left_toe"
+    assert metrics["active"][0] == {
+        "name": "knee_l", "side": "lower", "value": 0.264, "places": ["left_toe"],
+    }  # fmt: skip
     assert set(metrics["input_hashes"]) == {"config", "patient", "patient_kept"}
 
 

@@ -17,7 +17,7 @@ from pathwalker_cli.gait.bounds import gait_bounds, helped_bounds
 from pathwalker_cli.gait.shortfall import MissingTorque, Shortfall, missing_torques
 from pathwalker_cli.gait.solution import TOO_WEAK, GaitSolution
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.results.solve_text import failure_text, shortfall_text
+from pathwalker_cli.results.text import failure_text, shortfall_text
 
 
 def test_help_counts_for_the_muscle_that_pulls_its_way_and_small_help_does_not() -> None:

@@ -16,7 +16,7 @@ from pathwalker_cli.report.html import page_of
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.results import run_folder
-from pathwalker_cli.results.metrics_model import RunMetrics
+from pathwalker_cli.results.metrics import RunMetrics
 from pathwalker_cli.studies.verdict import verdict_of_metrics
 from pathwalker_cli.studies.verdict_text import verdict_lines
 from report_runs import write_made_run

@@ -11,8 +11,7 @@ from typing import Final, Literal
 import numpy as np
 
 from pathwalker_cli.animation.frames import GaitFrames
-from pathwalker_cli.conventions import GENERATORS, SUFFIX, Side
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.conventions import GENERATORS, SIDES, SUFFIX, Side
 from pathwalker_cli.stride.figures.style import FORCE_LENGTH
 
 __all__ = ["Drawing", "Shape", "View", "common_view", "drawing", "force_scale", "words"]
@@ -125,7 +124,7 @@ def drawing(frames: GaitFrames) -> Drawing:
         frames=frames,
         points=points,
         shapes=(*left, *_trunk(points), *right),
-        arrows={side: _arrows(frames, side) for side in BOTH_SIDES},
+        arrows={side: _arrows(frames, side) for side in SIDES},
     )
 
 

@@ -46,9 +46,9 @@ from pathwalker_cli.animation.look import (
     shape_look,
     subtitle,
 )
+from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import output_path
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.figures.style import BODY_COLOUR, FORCE_COLOUR, STYLE
 
 __all__ = ["MOST_FRAMES", "film_rate", "write_film"]
@@ -173,7 +173,7 @@ class _Panel:
             artist.set_xy(shape.at(self.stride.points, i) + walked)
             if shape.generator is not None:
                 artist.set_facecolor(_COLOURS(frames.activation[i, shape.generator]))
-        for side, artist in zip(BOTH_SIDES, self.arrows, strict=True):
+        for side, artist in zip(SIDES, self.arrows, strict=True):
             arrow = self.stride.arrows[side][i]
             artist.set_visible(bool(np.isfinite(arrow).all()))
             if artist.get_visible():
@@ -245,7 +245,7 @@ def _panel(axes: Axes, each: Drawing, view: View) -> _Panel:
     axes.text(0.05, view.top - 0.05, f"force of 1 body weight,\n{frames.weight:.0f} N",
               transform=axes.get_yaxis_transform(), va="top", fontsize=8)  # fmt: skip
     looks = [(shape_look(shape), shape.closed) for shape in each.shapes]
-    arrows = [arrow_look(side) for side in BOTH_SIDES]
+    arrows = [arrow_look(side) for side in SIDES]
     return _Panel(
         stride=each,
         view=view,

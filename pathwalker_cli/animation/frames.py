@@ -10,13 +10,16 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import Condition, Side
+from pathwalker_cli.conventions import SIDES, Condition, Side
 from pathwalker_cli.evaluation.run import run_names, run_notes, stride_of_run
 from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.stride.body import body_points
-from pathwalker_cli.stride.cycle import BOTH_SIDES, foot_strike_time, switching_times
-from pathwalker_cli.stride.feet import centre_of_pressure
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import (
+    body_points,
+    centre_of_pressure,
+    stride_of,
+    switching_times,
+)
 
 __all__ = ["GaitFrames", "gait_frames", "run_frames"]
 
@@ -119,14 +122,14 @@ def gait_frames(
         count: Number of instants.
         notes: What to know about it, one sentence each.
     """
-    strike = foot_strike_time(series, "right")
+    strike = stride_of(series).strike("right")
     later = strike + series.duration * np.arange(count) / count
     again = later >= series.duration
     time = np.where(again, later - series.duration, later)
     points, phase = _points(series, time), _phases(series, time)
     ahead = np.where(again, series.distance, 0.0) - points["heel_r"][0, 0]
     feet = dict(
-        zip(BOTH_SIDES, _in_phase(series, _feet(series), time, phase).swapaxes(0, 1), strict=True)
+        zip(SIDES, _in_phase(series, _feet(series), time, phase).swapaxes(0, 1), strict=True)
     )
     return GaitFrames(
         name=name,
@@ -158,7 +161,7 @@ def _feet(series: GaitSeries) -> np.ndarray:
     All are NaN where the foot is not loaded.
     """
     feet = []
-    for side in BOTH_SIDES:
+    for side in SIDES:
         centre = centre_of_pressure(series, side)
         force = np.stack([series.forward_force(side), series.vertical_force(side)], axis=1)
         force[np.isnan(centre)] = np.nan
@@ -185,7 +188,7 @@ def _points(series: GaitSeries, time: np.ndarray) -> dict[str, np.ndarray]:
 
 def _phases(series: GaitSeries, time: np.ndarray) -> tuple[str, ...]:
     """Return the phase at some instants; a phase begins with its first one."""
-    rows = np.searchsorted(switching_times(series), time, side="right") - 1
+    rows = np.searchsorted(switching_times(series.motion), time, side="right") - 1
     return tuple(PHASE_NAMES[min(row, len(PHASE_NAMES) - 1)] for row in rows)
 
 

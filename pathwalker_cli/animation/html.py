@@ -30,9 +30,8 @@ from pathwalker_cli.animation.look import (
     shape_look,
     subtitle,
 )
-from pathwalker_cli.conventions import GENERATORS
+from pathwalker_cli.conventions import GENERATORS, SIDES
 from pathwalker_cli.io.templates import templates
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.figures.style import BODY_COLOUR, FORCE_COLOUR
 
 __all__ = ["RATE", "html_page"]
@@ -89,9 +88,7 @@ def _panel(each: Drawing) -> dict[str, Any]:
         "weight": frames.weight,
         "weight_length": force_scale(frames) * frames.weight,
         "shapes": [asdict(shape_look(shape)) | {"title": _title(shape)} for shape in each.shapes],
-        "arrows": [
-            asdict(arrow_look(side)) | {"title": f"ground force, {side}"} for side in BOTH_SIDES
-        ],
+        "arrows": [asdict(arrow_look(side)) | {"title": f"ground force, {side}"} for side in SIDES],
     }
 
 
@@ -113,7 +110,7 @@ def _data(each: Drawing) -> dict[str, Any]:
         "middle": frames.middle,
         "phases": [words(name) for name in frames.phase],
         "points": {name: _rounded(xz, 4) for name, xz in each.points.items()},
-        "arrows": [_loaded(each.arrows[side]) for side in BOTH_SIDES],
+        "arrows": [_loaded(each.arrows[side]) for side in SIDES],
         "activation": _rounded(frames.activation, 3),
         "shapes": [
             {

@@ -13,12 +13,11 @@ import numpy as np
 import pinocchio as pin
 from pinocchio.visualize import MeshcatVisualizer
 
-from pathwalker_cli.conventions import COORDINATES, SUFFIX, Side
+from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.stride.body import body_points
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import body_points
 
 __all__ = ["open_viewer", "poses", "show", "walker_geometry"]
 
@@ -89,7 +88,7 @@ _Part = tuple[str, str, coal.CollisionGeometry, pin.SE3, np.ndarray]
 def _parts(walker: Walker) -> Iterator[_Part]:
     """Yield name, joint, shape, place on the joint and colour of everything that is drawn."""
     points = body_points(walker, np.zeros(len(COORDINATES)))
-    for side in BOTH_SIDES:
+    for side in SIDES:
         yield from _leg(points, side, walker.condition == "orthosis")
     dark = _grey(_SHADES["right"])
     hips = [np.array([0.0, y, 0.0]) for y in _ACROSS.values()]

@@ -11,8 +11,9 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, GRAVITY, SIDES, STIFFNESSES
+from pathwalker_cli.conventions import COORDINATES, GRAVITY, SIDES
 from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.gait.bounds import Range
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.patient import OrthosisData, Patient
 from pathwalker_cli.patient.proportions import SOURCE, default_length
@@ -114,7 +115,7 @@ def oddities(solver: GaitSolver) -> Iterator[str]:
     """Yield sentences about what is allowed and probably not meant."""
     yield from _odd_speeds(solver)
     yield from _partly_real_springs(solver)
-    yield from _start_springs(solver)
+    yield from _start_numbers(solver)
     yield from _start_angles(solver)
     yield from _comfort(solver)
 
@@ -192,22 +193,22 @@ def _pitch(solver: GaitSolver, q: np.ndarray, side: str) -> float:
     return -math.atan2(up, forward)
 
 
-def _real_range(solver: GaitSolver, name: str) -> tuple[float, float]:
-    real = solver.walker.patient.require_orthosis().stiffness_range
-    low, high = getattr(real, name.split("_")[0])
-    return float(low), float(high)
+def _spring_ranges(solver: GaitSolver) -> Iterator[tuple[str, Range, Range]]:
+    """Yield name, range and range of real springs [N m/rad] of every spring that is sought."""
+    for unknown in solver.walker.unknowns:
+        kind = unknown.numbers[0].name
+        if kind in solver.walker.device.identified:
+            real = solver.walker.patient.require_orthosis().stiffness_range
+            pair = solver.bounds.ranges[unknown.name]
+            yield unknown.name, pair, getattr(real, kind.removesuffix("_stiffness"))
 
 
 def _springs(solver: GaitSolver) -> Iterator[ConfigError]:
-    if solver.walker.orthosis is None:
-        return
-    for name in STIFFNESSES:
-        low, high = solver.bounds.table.entries[(name,)]
-        least, most = _real_range(solver, name)
+    for name, (low, high), (least, most) in _spring_ranges(solver):
         if low > most or high < least:
             yield ConfigError(
                 f"is [{low:g}, {high:g}] N m/rad for {name}, where there is no real spring",
-                where=_spring_key(solver, name),
+                where=solver.bounds.keys[name],
                 allowed=f"within {least:g} to {most:g} N m/rad, the stiffness_range of the "
                 "patient's orthosis",
                 mend="correct one of the two",
@@ -215,33 +216,31 @@ def _springs(solver: GaitSolver) -> Iterator[ConfigError]:
             return
 
 
-def _spring_key(solver: GaitSolver, name: str) -> str:
-    given = solver.config.bounds.stiffness
-    return f"bounds.stiffness.{name}" if name in given else f"bounds.{name.rpartition('_')[0]}"
-
-
 def _partly_real_springs(solver: GaitSolver) -> Iterator[str]:
-    if solver.walker.orthosis is None:
-        return
-    for name in STIFFNESSES:
-        low, high = solver.bounds.table.entries[(name,)]
-        least, most = _real_range(solver, name)
+    for name, (low, high), (least, most) in _spring_ranges(solver):
         if low < least or high > most:
             yield (
-                f"{_spring_key(solver, name)} lets {name} reach [{low:g}, {high:g}] N m/rad; real "
+                f"{solver.bounds.keys[name]} lets {name} reach [{low:g}, {high:g}] N m/rad; real "
                 f"springs end at [{least:g}, {most:g}]"
             )
 
 
-def _start_springs(solver: GaitSolver) -> Iterator[str]:
-    for name, value in solver.config.start.stiffness.items():
-        if solver.walker.orthosis is None:
-            yield f"start.stiffness.{name} has no effect barefoot"
+def _start_numbers(solver: GaitSolver) -> Iterator[str]:
+    """Yield a sentence for every number of the start that is not free, or outside its range."""
+    start = solver.config.start
+    given = {f"stiffness.{name}": (name, value) for name, value in start.stiffness.items()}
+    given |= {f"free.{place}": (place, value) for place, value in start.free.items()}
+    for key, (which, value) in given.items():
+        unknown = next((u for u in solver.walker.unknowns if which in (u.name, u.address)), None)
+        if unknown is None:
+            barefoot = not solver.walker.device.worn and key.startswith("stiffness")
+            why = "barefoot" if barefoot else "on what is not free to choose"
+            yield f"start.{key} has no effect {why}"
             continue
-        low, high = solver.bounds.table.entries[(name,)]
+        low, high = solver.bounds.ranges[unknown.name]
         if not low <= value <= high:
             yield (
-                f"start.stiffness.{name} {value:g} N m/rad lies outside its bounds "
+                f"start.{key} {value:g} {unknown.unit} lies outside its bounds "
                 f"[{low:g}, {high:g}]: the search begins at the nearer end"
             )
 

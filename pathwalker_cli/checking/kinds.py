@@ -36,7 +36,7 @@ from pathwalker_cli.io.yaml_file import load_yaml
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient, shipped_patients
 from pathwalker_cli.problems import problem_named
-from pathwalker_cli.results.orthosis_text import orthosis_rows
+from pathwalker_cli.results.text import orthosis_rows
 from pathwalker_cli.studies.batch.schema import BatchStudy
 from pathwalker_cli.studies.landscape.study import LandscapeStudy
 from pathwalker_cli.studies.perturbation.study import PerturbationStudy

@@ -11,8 +11,7 @@ from pathwalker_cli.model.healthy import healthy_strength
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import Strengths
-from pathwalker_cli.results.orthosis_text import orthosis_rows
-from pathwalker_cli.results.solve_text import notes_together
+from pathwalker_cli.results.text import notes_together, orthosis_rows
 
 __all__ = ["orthosis_content", "patient_content", "patient_remarks", "patient_rows", "walker_rows"]
 

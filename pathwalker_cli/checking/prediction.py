@@ -18,7 +18,7 @@ from pathwalker_cli.checking.patient import (
 from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.config.values import changed_values
-from pathwalker_cli.conventions import CONDITIONS, STIFFNESSES
+from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import DataError, placed
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.solve import GaitSolver
@@ -184,7 +184,7 @@ def _content(solver: GaitSolver) -> tuple[dict[str, Any], Seconds]:
         "intervals": intervals,
         "unknowns": program.size,
         "rows": program.rows,
-        "free_parameters": _free_springs(solver),
+        "free_parameters": [unknown.name for unknown in solver.free],
         "bounds": _bounds(solver),
         "cost_weights": _weights(solver),
         "not_default": {
@@ -241,14 +241,6 @@ def _weights(solver: GaitSolver) -> dict[str, float]:
         "excitation": "squared excitations",
     }
     return {named.get(name, f"goal {name}"): value for name, value in weights.items() if value}
-
-
-def _free_springs(solver: GaitSolver) -> list[str]:
-    """Return the stiffnesses that are sought."""
-    if solver.walker.orthosis is None:
-        return []
-    lower, upper = solver.bounds.table.arrays(STIFFNESSES)
-    return [n for n, a, b in zip(STIFFNESSES, lower, upper, strict=True) if a < b]
 
 
 def _bounds(solver: GaitSolver) -> dict[str, str]:

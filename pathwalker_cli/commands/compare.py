@@ -12,8 +12,8 @@ from pathwalker_cli.commands.options import json_option, out_option, print_json,
 
 if TYPE_CHECKING:
     from pathwalker_cli.evaluation.evaluate import Change, Evaluation
-    from pathwalker_cli.evaluation.gait import Gait
     from pathwalker_cli.report.compare import Comparison
+    from pathwalker_cli.stride.stride import Stride
 
 
 @click.command("compare")
@@ -31,8 +31,7 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
     from textwrap import fill
 
     from pathwalker_cli.errors import DataError
-    from pathwalker_cli.report.compare import compare_runs
-    from pathwalker_cli.report.compare_text import comparison_content, comparison_lines
+    from pathwalker_cli.report.compare import compare_runs, comparison_content, comparison_lines
 
     if len(runs) < 2:
         raise DataError("is one run", where=str(runs[0]), allowed="two runs or more")
@@ -51,11 +50,11 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
 
 def _write(out: Path, comparison: Comparison) -> None:
     """Write tables and figures, all or none."""
+    from pathwalker_cli.evaluation.curves import traces
     from pathwalker_cli.evaluation.figures import save_overlays
-    from pathwalker_cli.evaluation.traces import traces
     from pathwalker_cli.inverse.recorded_files import staged_folder
     from pathwalker_cli.io.json_file import write_json
-    from pathwalker_cli.report.compare_text import comparison_content, write_comparison_csv
+    from pathwalker_cli.report.compare import comparison_content, write_comparison_csv
 
     with staged_folder(out) as folder:
         write_json(folder / "compare.json", comparison_content(comparison))
@@ -77,8 +76,8 @@ def evaluate_command(
     other. Recordings are those beside the patient's file. A run that did not converge is refused.
     """
     from pathwalker_cli.evaluation.evaluate import evaluate_gait
-    from pathwalker_cli.evaluation.files import evaluation_content
     from pathwalker_cli.evaluation.run import gaits_of_runs
+    from pathwalker_cli.evaluation.tables import evaluation_content
 
     gaits = [gait for _, gait in gaits_of_runs(runs)]
     trials = _trials(gaits, trial)
@@ -93,7 +92,7 @@ def evaluate_command(
         _report(evaluations, changes, out)
 
 
-def _trials(gaits: Sequence[Gait], trial: str | None) -> list[str | None]:
+def _trials(gaits: Sequence[Stride], trial: str | None) -> list[str | None]:
     """Return the trial for each gait: the wanted one where its condition has it.
 
     Raises:
@@ -131,9 +130,9 @@ def _write_evaluation(
     out: Path, evaluations: Sequence[Evaluation], content: dict[str, Any]
 ) -> None:
     """Write tables and figures, all or none."""
+    from pathwalker_cli.evaluation.curves import Trace
     from pathwalker_cli.evaluation.figures import save_evaluation_figures
-    from pathwalker_cli.evaluation.files import write_csv
-    from pathwalker_cli.evaluation.traces import lone_trace
+    from pathwalker_cli.evaluation.tables import write_csv
     from pathwalker_cli.inverse.recorded_files import staged_folder
     from pathwalker_cli.io.json_file import write_json
 
@@ -143,7 +142,7 @@ def _write_evaluation(
         for each in evaluations:
             figures = folder / "figures"
             save_evaluation_figures(
-                lone_trace(each.gait, each.recorded),
+                Trace(each.gait, each.gait.problem, each.recorded),
                 figures / each.gait.name if len(evaluations) > 1 else figures,
             )
 
@@ -152,7 +151,7 @@ def _report(evaluations: Sequence[Evaluation], changes: Sequence[Change], out: P
     """Print the tables and what to know about them."""
     from textwrap import fill
 
-    from pathwalker_cli.evaluation.text import change_lines, evaluation_lines, evaluation_notes
+    from pathwalker_cli.evaluation.tables import change_lines, evaluation_lines, evaluation_notes
 
     for each in evaluations:
         click.echo("\n".join(evaluation_lines(each)) + "\n")

@@ -64,7 +64,7 @@ def solve_command(
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.results.run_folder import claimed_run, default_folder
-    from pathwalker_cli.results.solve_text import failure_text
+    from pathwalker_cli.results.text import failure_text
     from pathwalker_cli.studies.run import run_study
 
     case = _case(problem, config, changes, smoke)
@@ -96,7 +96,7 @@ def _case(problem: str, path: str, changes: tuple[str, ...], smoke: bool) -> Cas
 
 def _worn(case: Case) -> tuple[str, ...]:
     """Return what is worn, to be read while the solve runs: a wrong sign shows as a direction."""
-    from pathwalker_cli.results.orthosis_text import orthosis_rows
+    from pathwalker_cli.results.text import orthosis_rows
 
     worn = case.patient.orthosis
     if case.config.condition == "barefoot" or worn is None:
@@ -119,25 +119,28 @@ def _report(outcome: Outcome, folder: Path) -> None:
     """Print the summary of a run."""
     from rich.console import Console
 
-    from pathwalker_cli.results.run_metrics import stiffness_ranges
-    from pathwalker_cli.results.solve_text import (
+    from pathwalker_cli.results.metrics import stiffness_ranges
+    from pathwalker_cli.results.text import (
         detail_lines,
         notes_together,
         optimum_lines,
         source_lines,
+        spring_notes,
+        summary,
+        summary_renderable,
+        summary_rows,
     )
-    from pathwalker_cli.results.text import active_bounds, summary, summary_renderable
     from pathwalker_cli.studies.verdict_text import verdict_lines
 
     solution, metrics, verdict = outcome
     if solution.config.smoke:
         click.echo("SMOKE: a quick check on a coarse mesh; its numbers are not for use.\n")
-    bounds = active_bounds(metrics, stiffness_ranges(solution)) if solution.converged else ()
-    console = Console()
+    notes = spring_notes(metrics, stiffness_ranges(solution)) if solution.converged else ()
+    console, rows = Console(), summary_rows(metrics, solution.status, solution.cost)
     if console.is_terminal:
-        console.print(summary_renderable(metrics, solution.status, solution.cost, bounds))
+        console.print(summary_renderable(rows, notes))
     else:
-        click.echo(summary(metrics, solution.status, solution.cost, bounds))
+        click.echo(summary(rows, notes))
     click.echo()
     if verdict is not None:
         click.echo(f"How sure are the {'numbers' if verdict.numbers else 'springs'}?")

@@ -78,7 +78,7 @@ def rerun_command(run: Path, out: Path | None, quiet: bool) -> None:
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.results.run_folder import claimed_run, load_run
-    from pathwalker_cli.results.solve_text import failure_text
+    from pathwalker_cli.results.text import failure_text
     from pathwalker_cli.studies.run import run_study
     from pathwalker_cli.verification.text import difference_lines
 

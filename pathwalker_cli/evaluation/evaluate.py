@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any
 
-from pathwalker_cli.evaluation.angle_rms import (
+from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.evaluation.differences import (
+    DIFFERENCES,
+    force_rms,
+    recorded_force_rms,
     recorded_rms_mean_cycle,
     recorded_rms_one_trial,
     rms_mean_cycle,
     rms_one_trial,
 )
-from pathwalker_cli.evaluation.force_rms import force_rms, recorded_force_rms
-from pathwalker_cli.evaluation.gait import Gait
-from pathwalker_cli.evaluation.numbers import gait_numbers, recorded_numbers
 from pathwalker_cli.evaluation.paper import (
     PATIENT,
     PaperClaim,
@@ -21,24 +23,27 @@ from pathwalker_cli.evaluation.paper import (
     paper_claim,
     paper_number,
 )
-from pathwalker_cli.evaluation.quantities import CHANGES, QUANTITIES, Quantity
-from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
-from pathwalker_cli.evaluation.reference import ReferenceStride, reference_stride
-from pathwalker_cli.evaluation.spread import Position, Spread
-from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.evaluation.recorded import (
+    Position,
+    RecordedGait,
+    Spread,
+    recorded_gait,
+    recorded_numbers,
+    reference_stride,
+)
+from pathwalker_cli.stride.measure import SECTIONS, Measure
+from pathwalker_cli.stride.measures import measures_in
+from pathwalker_cli.stride.stride import Stride
 
-Value = TypeVar("Value")
-
-__all__ = ["Change", "Evaluation", "Row", "evaluate_gait", "gait_changes"]
+__all__ = ["Change", "Evaluation", "Row", "compared", "evaluate_gait", "gait_changes"]
 
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of a gait; SI units.
+    """One measure of a gait; SI units.
 
     Args:
-        quantity: What it is.
+        measure: What it is.
         value: Its value, None if the gait does not tell.
         recorded: What recordings say, None if they do not; of a difference to recordings, that of
             single recorded strides or stances.
@@ -46,7 +51,7 @@ class Row:
         paper_recorded: What the article prints for the recordings, or None.
     """
 
-    quantity: Quantity
+    measure: Measure
     value: float | None
     recorded: Spread | None = None
     paper: PaperNumber | None = None
@@ -62,17 +67,17 @@ class Row:
 
 @dataclass(frozen=True)
 class Change:
-    """How one quantity changes from barefoot to orthosis; SI units.
+    """How one measure changes from barefoot to orthosis; SI units.
 
     Args:
-        quantity: What it is.
+        measure: What it is.
         barefoot: Its value barefoot.
         orthosis: Its value with orthoses.
         recorded: Change of the recorded mean, or None.
         paper: Change that the article prints, or says in words, or None.
     """
 
-    quantity: Quantity
+    measure: Measure
     barefoot: float
     orthosis: float
     recorded: float | None = None
@@ -92,31 +97,31 @@ class Evaluation:
         gait: The gait.
         recorded: The recordings of its condition, None if there are none.
         one_trial: Name of the trial of the comparison at equal time, "" without one.
-        rows: All quantities in the order of `quantities.QUANTITIES`; those that neither gait nor
-            recordings nor article know are left out.
+        rows: All measures in the order of `compared`; those that neither gait nor recordings nor
+            article know are left out.
         notes: What could not be compared and what to know, one sentence each.
     """
 
-    gait: Gait
+    gait: Stride
     recorded: RecordedGait | None
     one_trial: str
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
 
     def row(self, key: str) -> Row:
-        """Return the row of a quantity.
+        """Return the row of a measure.
 
         Raises:
             KeyError: If it was left out.
         """
-        found = next((row for row in self.rows if row.quantity.key == key), None)
+        found = next((row for row in self.rows if row.measure.key == key), None)
         if found is None:
             raise KeyError(key)
         return found
 
 
 def evaluate_gait(
-    gait: Gait, trial: str | None = None, recorded: RecordedGait | None = None
+    gait: Stride, trial: str | None = None, recorded: RecordedGait | None = None
 ) -> Evaluation:
     """Return a gait beside the recordings of its patient and condition.
 
@@ -131,22 +136,31 @@ def evaluate_gait(
     """
     recorded = recorded or recorded_gait(gait.walker)
     reference = reference_stride(recorded, trial) if recorded else None
-    found = _Found(gait_numbers(gait), {}, gait.notes)
+    values = {measure.key: measure.of(gait) for measure in measures_in("evaluate")}
+    spreads: dict[str, Spread] = {}
+    notes = gait.notes
     if recorded is None:
-        found += _nothing_recorded(gait.walker)
+        notes += (_nothing_recorded(gait),)
     else:
-        found += _Found({}, recorded_numbers(recorded))
-        found += _forces(gait, recorded)
-        found += _mean_cycle(gait, recorded)
-        found += _one_trial(gait, recorded, reference)
-    rows = (_row(gait, quantity, found) for quantity in QUANTITIES)
+        spreads = recorded_numbers(recorded)
+        for more, recorded_too, note in _differences(gait, recorded, reference):
+            values |= more
+            spreads |= recorded_too
+            notes += note
+    rows = (_row(gait, m, values.get(m.key), spreads.get(m.key)) for m in compared())
     return Evaluation(
         gait=gait,
         recorded=recorded,
-        one_trial=reference.trial if reference else "",
-        rows=tuple(row for row in rows if _told(row)),
-        notes=found.notes,
+        one_trial=reference.name if reference else "",
+        rows=tuple(row for row in rows if any((row.value is not None, row.recorded, row.paper))),
+        notes=notes,
     )
+
+
+def compared() -> tuple[Measure, ...]:
+    """Return all measures in which a gait is compared, in the order in which they are shown."""
+    found = (*measures_in("evaluate"), *DIFFERENCES)
+    return tuple(sorted(found, key=lambda measure: SECTIONS.index(measure.section)))
 
 
 def gait_changes(barefoot: Evaluation, orthosis: Evaluation) -> tuple[Change, ...]:
@@ -157,100 +171,74 @@ def gait_changes(barefoot: Evaluation, orthosis: Evaluation) -> tuple[Change, ..
         orthosis: A gait of the same patient with orthoses.
     """
     article = barefoot.gait.walker.patient.id == PATIENT
-    before = {row.quantity.key: row for row in barefoot.rows}
-    after = {row.quantity.key: row for row in orthosis.rows}
-    found = []
-    for quantity in CHANGES:
-        first, second = before.get(quantity.key), after.get(quantity.key)
+    before = {row.measure.key: row for row in barefoot.rows}
+    after = {row.measure.key: row for row in orthosis.rows}
+    changes = []
+    for measure in measures_in("evaluate"):
+        first, second = before.get(measure.key), after.get(measure.key)
         if first is None or second is None or first.value is None or second.value is None:
             continue
         both = (first.recorded, second.recorded)
         recorded = both[1].mean - both[0].mean if both[0] and both[1] else None
-        paper = paper_number("change", quantity.key) or paper_claim(quantity.key)
-        found.append(
-            Change(quantity, first.value, second.value, recorded, paper if article else None)
+        paper = paper_number("change", measure.key) or paper_claim(measure.key)
+        changes.append(
+            Change(measure, first.value, second.value, recorded, paper if article else None)
         )
-    return tuple(found)
+    return tuple(changes)
 
 
-@dataclass(frozen=True)
-class _Found:
-    """Values of the gait and of the recordings by key of a quantity, and notes."""
-
-    values: dict[str, float]
-    spreads: dict[str, Spread]
-    notes: tuple[str, ...] = ()
-
-    def __add__(self, other: _Found) -> _Found:
-        return _Found(
-            self.values | other.values, self.spreads | other.spreads, self.notes + other.notes
-        )
+Found = tuple[dict[str, float], dict[str, Spread], tuple[str, ...]]
+"""Differences of the gait and of single recorded strides by key, and notes."""
 
 
-def _nothing_recorded(walker: Walker) -> _Found:
+def _nothing_recorded(gait: Stride) -> str:
     """Return the note that there are no recordings."""
-    note = (
+    walker = gait.walker
+    return (
         f"patient {walker.patient.id} has no {walker.condition} recordings beside its file: joint "
         "angles, ground forces, ankle torques, steps and times are not compared"
     )
-    return _Found({}, {}, (note,))
 
 
-def _forces(gait: Gait, recorded: RecordedGait) -> _Found:
-    """Return the differences of ground reaction forces."""
-    notes = tuple(
+def _differences(gait: Stride, recorded: RecordedGait, reference: Stride | None) -> Iterator[Found]:
+    """Yield the differences of ground forces and joint angles, or why there are none."""
+    blind = [side for side in SIDES if len(recorded.stance_forces(side)) == 0]
+    notes = (
         f"no recorded {side} stance has a measured force: ground forces are not compared, nor the "
         f"torques of the {side} ankle"
-        for side in BOTH_SIDES
-        if len(recorded.stance_forces(side)) == 0
+        for side in blind
     )
-    return _Found(force_rms(gait, recorded), recorded_force_rms(recorded), notes)
-
-
-def _mean_cycle(gait: Gait, recorded: RecordedGait) -> _Found:
-    """Return the differences of joint angles to the mean gait cycle."""
-    missing = [side for side in BOTH_SIDES if not any(recorded.cycles(side))]
+    yield force_rms(gait, recorded), recorded_force_rms(recorded), tuple(notes)
+    missing = [side for side in SIDES if not recorded.of("stride", side)]
     if missing:
         note = (
             f"the recordings show no complete {' or '.join(missing)} gait cycle: joint angles are "
             "not compared over the gait cycle"
         )
-        return _Found({}, {}, (note,))
-    return _Found(
-        _prefixed("rms_mean_cycle_", rms_mean_cycle(gait, recorded)),
-        _prefixed("rms_mean_cycle_", recorded_rms_mean_cycle(recorded)),
-    )
-
-
-def _one_trial(gait: Gait, recorded: RecordedGait, reference: ReferenceStride | None) -> _Found:
-    """Return the differences of joint angles to one trial at equal time."""
+        yield {}, {}, (note,)
+    else:
+        cycle = rms_mean_cycle(gait, recorded), recorded_rms_mean_cycle(recorded)
+        yield *(_prefixed("rms_mean_cycle_", each) for each in cycle), ()
     if reference is None:
         note = (
             "no recording shows a stride from a left toe-off to the next one: joint angles are not "
             "compared at equal time"
         )
-        return _Found({}, {}, (note,))
-    return _Found(
-        _prefixed("rms_one_trial_", rms_one_trial(gait, reference)),
-        _prefixed("rms_one_trial_", recorded_rms_one_trial(recorded, reference)),
-    )
+        yield {}, {}, (note,)
+    else:
+        trial = rms_one_trial(gait, reference), recorded_rms_one_trial(recorded, reference)
+        yield *(_prefixed("rms_one_trial_", each) for each in trial), ()
 
 
-def _prefixed(prefix: str, found: dict[str, Value]) -> dict[str, Value]:
+def _prefixed(prefix: str, values: dict[str, Any]) -> Any:
     """Return values under longer names."""
-    return {f"{prefix}{key}": value for key, value in found.items()}
+    return {f"{prefix}{key}": value for key, value in values.items()}
 
 
-def _row(gait: Gait, quantity: Quantity, found: _Found) -> Row:
-    """Return the row of a quantity; the article only for its own patient."""
-    key, walker = quantity.key, gait.walker
+def _row(gait: Stride, measure: Measure, value: float | None, recorded: Spread | None) -> Row:
+    """Return the row of a measure; the article only for its own patient."""
     printed = printed_recorded = None
-    if walker.patient.id == PATIENT:
-        printed = paper_number(gait.problem, key)
-        printed_recorded = paper_number(f"recorded-{walker.condition}", key)
-    return Row(quantity, found.values.get(key), found.spreads.get(key), printed, printed_recorded)
-
-
-def _told(row: Row) -> bool:
-    """Return whether anybody has a number for a quantity."""
-    return any(part is not None for part in (row.value, row.recorded, row.paper))
+    if gait.walker.patient.id == PATIENT:
+        printed = paper_number(gait.problem, measure.key)
+        printed_recorded = paper_number(f"recorded-{gait.walker.condition}", measure.key)
+    return Row(measure, value, recorded, printed, printed_recorded)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -12,20 +12,19 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.conventions import Side
-from pathwalker_cli.evaluation.ankle_panels import draw_ankle
-from pathwalker_cli.evaluation.cycle_curves import (
+from pathwalker_cli.conventions import SIDES, Side
+from pathwalker_cli.evaluation.curves import (
     ACTIVATIONS,
     ANGLES,
     FORCES,
     MOMENTS,
     CycleCurve,
+    Trace,
+    draw_ankle,
     draw_cycle,
     dress_cycle,
     known_curves,
 )
-from pathwalker_cli.evaluation.traces import Trace
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import (
     NEUTRAL,
@@ -38,9 +37,8 @@ from pathwalker_cli.stride.figures.style import (
 __all__ = [
     "ankle_figure",
     "ankle_pair",
+    "cycle_figure",
     "cycle_pairs",
-    "ground_force_figure",
-    "joint_angle_figure",
     "legend_handles",
     "save_evaluation_figures",
     "save_overlays",
@@ -52,27 +50,14 @@ ANKLE_HEIGHT: Final = 2.0 * PAIR_HEIGHT
 """The same of torque over angle, whose slopes shall be seen [in]."""
 
 
-def joint_angle_figure(trace: Trace) -> Figure:
-    """Return the joint angles of both sides over their gait cycles and the recorded range.
+def cycle_figure(trace: Trace, curves: Sequence[CycleCurve]) -> Figure:
+    """Return quantities of both sides over their gait cycles and the recorded range.
 
     A dot marks the least knee flexion of stance.
     """
-    handles = legend_handles([trace], dot="least knee flexion")
-    fig = cycle_pairs(ANGLES, [trace], _head(len(handles)))
-    legend(fig, handles)
-    return fig
-
-
-def ground_force_figure(trace: Trace) -> Figure:
-    """Return the ground reaction forces of both sides over their gait cycles, % body weight.
-
-    Raises:
-        ValueError: If the forces of the gait are not known.
-    """
-    if trace.gait.force is None:
-        raise ValueError(f"the forces of {trace.gait.name} are not known")
-    handles = legend_handles([trace])
-    fig = cycle_pairs(FORCES, [trace], _head(len(handles)))
+    dot = "least knee flexion" if any(curve.least_in_stance for curve in curves) else ""
+    handles = legend_handles([trace], dot)
+    fig = cycle_pairs(curves, [trace], _head(len(handles)))
     legend(fig, handles)
     return fig
 
@@ -81,7 +66,7 @@ def ankle_figure(trace: Trace) -> Figure:
     """Return the net torque-angle profile of both ankles over stance with its mean slope.
 
     Raises:
-        ValueError: If the torques of the gait are not known.
+        NotKnownError: If the torques of the gait are not known.
     """
     handles = [*_trace_handles([trace]), *_ankle_handles()]
     if trace.recorded is not None:
@@ -103,7 +88,7 @@ def cycle_pairs(curves: Sequence[CycleCurve], shown: Sequence[Trace], head: floa
     fig = new_figure(head + PAIR_HEIGHT * len(curves))
     panels = fig.subplots(len(curves), 2, sharey="row", squeeze=False)
     for row, curve in zip(panels, curves, strict=True):
-        for ax, side in zip(row, BOTH_SIDES, strict=True):
+        for ax, side in zip(row, SIDES, strict=True):
             draw_cycle(ax, curve, shown, side)
             dress_cycle(ax, curve, side, label=side == "right")
     return fig
@@ -118,7 +103,7 @@ def ankle_pair(shown: Sequence[Trace], head: float = 0.0) -> Figure:
     """
     fig = new_figure(head + ANKLE_HEIGHT)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
-    for ax, side in zip(panels, BOTH_SIDES, strict=True):
+    for ax, side in zip(panels, SIDES, strict=True):
         draw_ankle(ax, shown, side)
         label = "net plantarflexing torque [N m]" if side == "right" else ""
         dress(ax, f"{side.capitalize()} ankle in stance", "dorsiflexion [deg]", label)
@@ -132,17 +117,14 @@ def save_evaluation_figures(trace: Trace, folder: str | Path) -> tuple[str, ...]
         trace: The gait over its recordings.
         folder: Where; made if it does not exist.
     """
-    makers: dict[str, Callable[[Trace], Figure]] = {"joint_angles": joint_angle_figure}
-    if trace.gait.force is not None:
-        makers["ground_forces"] = ground_force_figure
+    makers: dict[str, Callable[[], Figure]] = {
+        name: partial(cycle_figure, trace, curves)
+        for name, curves in {"joint_angles": ANGLES, "ground_forces": FORCES}.items()
+        if known_curves(curves, [trace])
+    }
     if trace.gait.net_torque is not None:
-        makers["ankle_torque"] = ankle_figure
-    saved: list[str] = []
-    for name, make in makers.items():
-        with mpl.rc_context(STYLE):
-            figure = make(trace)
-        saved += save_formats(figure, folder, name)
-    return tuple(saved)
+        makers["ankle_torque"] = partial(ankle_figure, trace)
+    return _saved(makers, folder)
 
 
 def save_overlays(shown: Sequence[Trace], folder: str | Path) -> tuple[str, ...]:
@@ -165,13 +147,23 @@ def save_overlays(shown: Sequence[Trace], folder: str | Path) -> tuple[str, ...]
         if (known := known_curves(curves, shown))
     }
     if all(trace.gait.net_torque is not None for trace in shown):
-        makers["ankle_torque"] = lambda: ankle_pair(shown, head)
+        makers["ankle_torque"] = partial(ankle_pair, shown, head)
+
+    def dressed(name: str) -> Figure:
+        figure = makers[name]()
+        extra = _ankle_handles()[:1] if name == "ankle_torque" else []
+        legend(figure, [*_trace_handles(shown), *extra], columns=1 + (len(shown) > 3))
+        return figure
+
+    return _saved({name: partial(dressed, name) for name in makers}, folder)
+
+
+def _saved(makers: Mapping[str, Callable[[], Figure]], folder: str | Path) -> tuple[str, ...]:
+    """Save figures as PNG and SVG; return the file names."""
     saved: list[str] = []
     for name, make in makers.items():
         with mpl.rc_context(STYLE):
             figure = make()
-            extra = _ankle_handles()[:1] if name == "ankle_torque" else []
-            legend(figure, [*_trace_handles(shown), *extra], columns=1 + (len(shown) > 3))
         saved += save_formats(figure, folder, name)
     return tuple(saved)
 
@@ -202,7 +194,7 @@ def _trace_handles(shown: Sequence[Trace]) -> list[Any]:
     if len(shown) > 1 or shown[0].order is not None:
         return [Line2D([], [], label=trace.label, **trace.look("right")) for trace in shown]
     names: dict[Side, str] = {"right": f"{shown[0].label}: right", "left": "left"}
-    return [Line2D([], [], label=names[side], **shown[0].look(side)) for side in BOTH_SIDES]
+    return [Line2D([], [], label=names[side], **shown[0].look(side)) for side in SIDES]
 
 
 def _ankle_handles() -> list[Any]:

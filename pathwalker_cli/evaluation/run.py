@@ -6,18 +6,14 @@ from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 
-import numpy as np
-
 from pathwalker_cli.errors import DataError, NotConvergedError
-from pathwalker_cli.evaluation.gait import Gait
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.results.run_folder import Run, load_run
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.stride import Stride, stride_of
 
 __all__ = [
     "gait_of_run",
-    "gait_of_series",
     "gaits_of_runs",
     "run_and_gait",
     "run_names",
@@ -26,7 +22,7 @@ __all__ = [
 ]
 
 
-def gaits_of_runs(folders: Sequence[Path]) -> tuple[tuple[Run, Gait], ...]:
+def gaits_of_runs(folders: Sequence[Path]) -> tuple[tuple[Run, Stride], ...]:
     """Return several runs with their gaits under names that differ.
 
     Raises:
@@ -53,7 +49,7 @@ def run_names(folders: Sequence[Path]) -> tuple[str, ...]:
 
 
 def stride_of_run(folder: str | Path) -> tuple[Run, GaitSeries]:
-    """Return a converged run and its stride.
+    """Return a converged run and its time series.
 
     Args:
         folder: The folder that `pathwalker solve` wrote.
@@ -83,7 +79,7 @@ def run_notes(run: Run) -> tuple[str, ...]:
     return ("a quick check on a coarse mesh: for orientation only",) if run.config.smoke else ()
 
 
-def gait_of_run(folder: str | Path) -> Gait:
+def gait_of_run(folder: str | Path) -> Stride:
     """Return the gait of a converged run.
 
     Args:
@@ -96,49 +92,7 @@ def gait_of_run(folder: str | Path) -> Gait:
     return run_and_gait(folder, Path(folder).resolve().name)[1]
 
 
-def run_and_gait(folder: str | Path, name: str) -> tuple[Run, Gait]:
+def run_and_gait(folder: str | Path, name: str) -> tuple[Run, Stride]:
     """Return a converged run and its gait under a name; see `gait_of_run`."""
     run, series = stride_of_run(folder)
-    told = (run.config.problem, run.metrics["effort"], run_notes(run))
-    return run, gait_of_series(series, name, *told)
-
-
-def gait_of_series(
-    series: GaitSeries,
-    name: str,
-    problem: str,
-    effort: float | None = None,
-    notes: tuple[str, ...] = (),
-) -> Gait:
-    """Return a stride of the solver as a plain gait.
-
-    Args:
-        series: The stride.
-        name: What to call it.
-        problem: The problem that it solves.
-        effort: Integral of the sum of squared activations [s].
-        notes: What to know about it.
-
-    Raises:
-        ValueError: If it is no stride in the eight phases.
-    """
-    force = {
-        side: np.stack([series.forward_force(side), series.vertical_force(side)], axis=1)
-        for side in BOTH_SIDES
-    }
-    return Gait(
-        name=name,
-        problem=problem,
-        walker=series.walker,
-        time=series.time,
-        phase=series.phase,
-        phase_durations=series.motion.durations,
-        q=series.q,
-        force=force,
-        net_torque=series.net_torque,
-        muscle_torque=series.muscle_torque,
-        activation=series.activation,
-        effort=effort,
-        stiffness=series.stiffness if series.stiffness.size else None,
-        notes=notes,
-    )
+    return run, stride_of(series, name, run.config.problem, run_notes(run))

@@ -33,11 +33,13 @@ class GaitBounds:
         table: All bounds.
         sources: For every choice (name of the quantity) one clause: value and reason.
         ranges: Range of every unknown of the walker by name [SI].
+        keys: Key of the config that each range comes from, or that would change it.
     """
 
     table: BoundTable
     sources: dict[str, str]
     ranges: dict[str, Range]
+    keys: dict[str, str]
 
 
 def gait_bounds(
@@ -73,10 +75,10 @@ def gait_bounds(
     entries |= _lift_off()
     entries[("distance",)] = config.distance
     entries[("walking_speed",)] = (_least_speed(walker, config, sources), INFINITY)
-    ranges = _unknowns(walker, config, free, sources)
+    ranges, keys = _unknowns(walker, config, free, sources)
     entries |= {(name,): pair for name, pair in ranges.items()}
     entries |= {(name,): (0.0, 0.0) for name in RESERVES}
-    return GaitBounds(BoundTable(entries), sources, ranges)
+    return GaitBounds(BoundTable(entries), sources, ranges, keys)
 
 
 def recorded_durations(bounds: GaitBounds, durations: np.ndarray) -> GaitBounds:
@@ -199,8 +201,8 @@ def _least_speed(walker: Walker, config: BoundsConfig, sources: dict[str, str]) 
 
 def _unknowns(
     walker: Walker, config: BoundsConfig, free: Mapping[str, Range] | None, sources: dict[str, str]
-) -> dict[str, Range]:
-    """Return the ranges of the walker's unknowns by name: as freed, else of the springs."""
+) -> tuple[dict[str, Range], dict[str, str]]:
+    """Return ranges and keys of the walker's unknowns by name: as freed, else of the springs."""
     ranges = dict(free or {})
     entries: dict[str, Range] = {}
     keys: dict[str, str] = {}
@@ -214,12 +216,15 @@ def _unknowns(
         entries[unknown.name] = pair
         sources[unknown.name] = f"[{pair[0]:g}, {pair[1]:g}] {unknown.unit}, {reason}"
     _check_orthosis(walker, entries, keys)
-    return entries
+    return entries, keys
 
 
 def _check_range(unknown: Unknown, pair: Range) -> None:
     """Refuse a range whose ends the patient's file would not take."""
-    quantity = quantity_at(Patient, unknown.numbers[0].place)
+    place = unknown.numbers[0].place
+    if place.partition(".")[0] not in Patient.model_fields:
+        return  # a number without a key of its own
+    quantity = quantity_at(Patient, place)
     for value in pair:
         if not quantity.lower <= value <= quantity.upper:
             raise ConfigError(
@@ -235,7 +240,7 @@ def _spring_range(walker: Walker, config: BoundsConfig, unknown: Unknown) -> tup
     real = walker.patient.require_orthosis().stiffness_range
     kind = unknown.numbers[0].name
     given = config.stiffness.get(unknown.name) or getattr(config, kind)
-    key = f"bounds.stiffness.{unknown.name}" if unknown.name in config.stiffness else kind
+    key = f"stiffness.{unknown.name}" if unknown.name in config.stiffness else kind
     pair = given or getattr(real, kind.removesuffix("_stiffness"))
     return pair, "from the config" if given else f"real springs: {real.source}", f"bounds.{key}"
 

@@ -7,17 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import Condition, Side
+from pathwalker_cli.conventions import SIDES, Condition, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.cycles import gait_cycles, joint_ranges, step_lengths, walking_speed
 from pathwalker_cli.inverse.filters import frame_rate
 from pathwalker_cli.inverse.forces import foot_extents
+from pathwalker_cli.io.c3d import Event
 from pathwalker_cli.io.recordings import CompactRecording
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import Recorded
+from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["recorded"]
+__all__ = ["recorded", "trial_steps"]
 
 
 def recorded(
@@ -37,7 +39,9 @@ def recorded(
         DataError: If the trials show no complete gait cycle or no step of a side.
     """
     speeds = [walking_speed(trial.motion) for trial in trials]
-    steps = _steps(pinocchio_model(patient, condition), trials)
+    model = pinocchio_model(patient, condition)
+    each = [trial_steps(model, trial.motion, trial.events) for trial in trials]
+    steps = {side: [length for found in each for length in found[side]] for side in SIDES}
     ranges = joint_ranges(tuple((trial.motion, gait_cycles(trial.events)) for trial in trials))
     if not ranges or not all(steps.values()):
         raise DataError(f"{condition} trials of {patient.id} show no complete cycle and step")
@@ -59,17 +63,12 @@ def recorded(
     )
 
 
-def _steps(model: pin.Model, trials: Sequence[CompactRecording]) -> dict[Side, list[float]]:
-    """Return the step lengths of all trials per side [m]."""
-    steps: dict[Side, list[float]] = {"right": [], "left": []}
-    for trial in trials:
-        heels = {
-            side: ends[:, 0] for side, ends in foot_extents(model, trial.motion.values).items()
-        }
-        rate = frame_rate(trial.motion)
-        for side, lengths in step_lengths(trial.events, heels, rate).items():
-            steps[side] += lengths
-    return steps
+def trial_steps(
+    model: pin.Model, motion: Trajectory, events: tuple[Event, ...]
+) -> dict[Side, tuple[float, ...]]:
+    """Return the step lengths of a trial per side [m]."""
+    heels = {side: ends[:, 0] for side, ends in foot_extents(model, motion.values).items()}
+    return step_lengths(events, heels, frame_rate(motion))
 
 
 def _rounded(value: float | np.floating) -> float:

@@ -16,13 +16,12 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.conventions import GRAVITY, SUFFIX, Side, to_degrees
+from pathwalker_cli.conventions import GRAVITY, SIDES, SUFFIX, Side, to_degrees
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.bands import POINTS, CycleBand, cycle_band
 from pathwalker_cli.inverse.cycles import GaitCycle
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.io.atomic import atomic_path
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -225,7 +224,7 @@ def _bands(
             curves.append((table, cycles))
     sides: dict[Side, CycleBand] = {}
     toe_off: dict[Side, float] = {}
-    for side in BOTH_SIDES:
+    for side in SIDES:
         own = [cycle for _, cycles in curves for cycle in cycles if cycle.side == side]
         if own:
             sides[side] = cycle_band(curves, side)

@@ -6,13 +6,12 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, SUFFIX, Condition
+from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Condition
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.inverse.bands import POINTS, cycle_band
 from pathwalker_cli.inverse.cycles import gait_cycles
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 from pathwalker_cli.stride.figures.curves import Band, Reference
 
 __all__ = ["recorded_reference"]
@@ -32,7 +31,7 @@ def recorded_reference(patient: Patient, condition: Condition) -> Reference | No
             read_recording(patient, condition, name) for name in recording_names(patient, condition)
         ]
         trials = [(each.motion, gait_cycles(each.events)) for each in recordings]
-        bands = {side: cycle_band(trials, side) for side in BOTH_SIDES}
+        bands = {side: cycle_band(trials, side) for side in SIDES}
     except InputError:  # a prediction needs no recordings
         return None
     percent = np.linspace(0.0, 100.0, POINTS)

@@ -60,15 +60,11 @@ class ActiveBound:
         return f"{self.name} {self.side} {self.value:.4g}{where}"
 
     @classmethod
-    def parse(cls, text: str) -> ActiveBound:
-        """Return the bound of such a text.
-
-        Raises:
-            ValueError: If it is none.
-        """
+    def parsed(cls, text: str) -> ActiveBound | None:
+        """Return the bound of such a text as older runs have it, None if it is none."""
         match = _ACTIVE_BOUND.fullmatch(text)
         if match is None:
-            raise ValueError(f"'{text}' is no active bound")
+            return None
         places = match["places"]
         return cls(match["name"], match["side"], float(match["value"]),
                    tuple(places.split(", ")) if places else ())  # fmt: skip

@@ -9,10 +9,10 @@ from typing import Any, Final
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.config.values import changed_values, value_text
 from pathwalker_cli.conventions import LEG_JOINTS, SUFFIX
-from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.report.content import Section, fact_table
 from pathwalker_cli.report.runs import ReportRun
-from pathwalker_cli.results.solve_text import bound_line, interesting, notes_together, source_lines
+from pathwalker_cli.results.metrics import RunMetrics
+from pathwalker_cli.results.text import bound_line, interesting, notes_together, source_lines
 
 __all__ = ["assumption_section"]
 
@@ -73,7 +73,7 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
             ]
         ),
     )
-    yield "Active bounds", "; ".join(_bounds(metrics)) or "none that shapes the gait"
+    yield "Active bounds", "; ".join(_bounds(run.run.result)) or "none that shapes the gait"
     worst = _in_words(_text(metrics, "largest_violation_name"))
     yield (
         "Tolerances",
@@ -119,15 +119,14 @@ def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
     )
 
 
-def _bounds(metrics: Mapping[str, Any]) -> Iterator[str]:
+def _bounds(result: RunMetrics) -> Iterator[str]:
     """Yield the active bounds that are choices, where they come from, and how many others."""
-    bounds = [bound for text in metrics.get("active_bounds") or () if (bound := _bound(str(text)))]
-    chosen = [bound for bound in bounds if interesting(bound)]
+    chosen = [bound for bound in result.bounds if interesting(bound)]
     yield from (_in_words(bound_line(bound)) for bound in chosen)
-    given = metrics.get("bound_sources") or {}
+    given = result.bound_sources or {}
     sources = {b.name: given[b.name] for b in chosen if b.name in given}
     yield from source_lines(sources)
-    others = len(metrics.get("active_bounds") or ()) - len(chosen)
+    others = len(result.active_bounds or ()) - len(chosen)
     if others:
         yield f"{others} more of muscles, ground forces and foot heights at their natural limits"
 
@@ -136,14 +135,6 @@ def _in_words(text: str) -> str:
     """Return a text that says "right knee" for "knee_r" and names feet and joints without "_"."""
     text = _JOINT.sub(lambda found: f"{_SIDE[found[2]]} {found[1]}", text)
     return _TWO_FEET.sub(r"\1 \2 with \3 \4", text).replace("_", " ")
-
-
-def _bound(text: str) -> ActiveBound | None:
-    """Return an active bound of the metrics, None if it is told in another way."""
-    try:
-        return ActiveBound.parse(text)
-    except ValueError:
-        return None
 
 
 def _short(metrics: Mapping[str, Any], key: str, form: str = ".1e") -> str:

@@ -2,69 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
+from textwrap import wrap
 from typing import Any, Final
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.config.values import differing_values
-from pathwalker_cli.evaluation.gait import Gait
-from pathwalker_cli.evaluation.quantities import QUANTITIES, Quantity
 from pathwalker_cli.evaluation.run import gaits_of_runs
 from pathwalker_cli.gait.costs import GOALS
+from pathwalker_cli.io.csv_file import write_table
+from pathwalker_cli.stride.measure import FORCE, LOADS, Measure
+from pathwalker_cli.stride.measures import measures_in
+from pathwalker_cli.stride.stride import Stride
 
-__all__ = ["Compared", "Comparison", "compare_runs"]
+__all__ = [
+    "Compared",
+    "Comparison",
+    "compare_runs",
+    "comparison_content",
+    "comparison_lines",
+    "write_comparison_csv",
+]
 
-_LOADS: Final = "Loads"
-_WORK: Final = "Work over the stride"
 _GOALS: Final = "Clinical goals, whether or not the cost weighs them"
-_SOLUTION: Final = "Solution"
+_WIDTH: Final = 80
+_NAME: Final = 11
+"""Columns of the terminal, and of the name of a run above its values."""
 
 
-def _named(*keys: str) -> tuple[Quantity, ...]:
-    """Return quantities of an evaluation whose keys are those of the metrics too."""
-    found = {quantity.key: quantity for quantity in QUANTITIES}
-    return tuple(found[key] for key in keys)
-
-
-def _sides(stem: str, label: str, unit: str, section: str, end: str = "") -> tuple[Quantity, ...]:
-    return tuple(
-        Quantity(f"{stem}_{side}{end}", f"{label}, {side}", unit, section)
-        for side in ("right", "left")
-    )
-
-
-_BOTH: Final = ("right", "left")
-
-COMPARED: Final = (
-    *_named(
-        "walking_speed",
-        *(f"step_length_{side}" for side in _BOTH),
-        "stride_time",
-        "cadence",
-        *(f"{stem}_{side}" for stem in ("stance_share", "swing_share") for side in _BOTH),
-        "double_support_share",
-        *(f"min_stance_knee_flexion_{side}" for side in _BOTH),
-    ),
-    *_sides("peak_vertical_force", "vertical peak", "body weights", _LOADS, "_body_weights"),
-    *_sides("ankle_torque_slope", "ankle torque slope", "N m/rad", _LOADS),
-    *_sides("max_friction_ratio", "friction ratio", "1", _LOADS),
-    Quantity("positive_muscle_work", "muscles, positive", "J", _WORK),
-    Quantity("negative_muscle_work", "muscles, negative", "J", _WORK),
-    Quantity("positive_orthosis_work", "orthoses, positive", "J", _WORK),
-    Quantity("negative_orthosis_work", "orthoses, negative", "J", _WORK),
-    *_named(
-        "effort_per_distance",
-        *(f"{kind}_stiffness_{s}" for kind in ("dorsiflexion", "plantarflexion") for s in _BOTH),
-    ),
-    *(
-        Quantity(f"goals.{name}", name.replace("_", " "), goal.unit, _GOALS)
+def compared() -> tuple[Measure, ...]:
+    """Return what is compared, in order; keys of `metrics.json`, of its parts with a dot."""
+    measures = [
+        replace(m, section=LOADS) if m.section == FORCE else m for m in measures_in("compare")
+    ]
+    goals = (
+        Measure(f"goals.{name}", name.replace("_", " "), goal.unit, "", None, section=_GOALS)
         for name, goal in GOALS.items()
-    ),
-    Quantity("cost", "cost", "1", _SOLUTION),
-)
-"""The metrics that are compared, in order; keys of `metrics.json`, of its parts with a dot."""
+    )
+    at = next(i for i, measure in enumerate(measures) if measure.key == "cost")
+    return (*measures[:at], *goals, *measures[at:])
+
 
 _DEPENDS: Final = {
     "cost": "cost.",
@@ -79,13 +59,13 @@ class Compared:
     """One metric of all runs; SI units.
 
     Args:
-        quantity: What it is.
+        measure: What it is.
         values: Its value in each run, None where a run does not have it.
         other: Runs whose config gives it another meaning than the first run's: no difference is
             told.
     """
 
-    quantity: Quantity
+    measure: Measure
     values: tuple[float | None, ...]
     other: frozenset[int] = frozenset()
 
@@ -115,7 +95,7 @@ class Comparison:
         config: Keys of the configs whose values differ, with the value of each run.
     """
 
-    gaits: tuple[Gait, ...]
+    gaits: tuple[Stride, ...]
     rows: tuple[Compared, ...]
     config: Mapping[str, tuple[str, ...]]
 
@@ -136,7 +116,7 @@ class Comparison:
             if len(set(values)) > 1:
                 pairs = zip(self.names, values, strict=True)
                 found.append(f"different {what}: {', '.join(f'{v} ({n})' for n, v in pairs)}")
-        if any(row.other for row in self.rows if row.quantity.key == "cost"):
+        if any(row.other for row in self.rows if row.measure.key == "cost"):
             found.append("costs of different weights or goals cannot be compared")
         return tuple(found)
 
@@ -150,11 +130,11 @@ def compare_runs(folders: Sequence[Path]) -> Comparison:
     runs, gaits = zip(*gaits_of_runs(folders), strict=True)
     found = (
         Compared(
-            quantity,
-            tuple(_number(run.metrics, quantity.key) for run in runs),
-            _other(quantity.key, [run.config for run in runs]),
+            measure,
+            tuple(_number(run.metrics, measure.key) for run in runs),
+            _other(measure.key, [run.config for run in runs]),
         )
-        for quantity in COMPARED
+        for measure in compared()
     )
     rows = tuple(row for row in found if any(value is not None for value in row.values))
     return Comparison(gaits, rows, differing_values([run.config for run in runs]))
@@ -178,3 +158,107 @@ def _number(metrics: Mapping[str, Any], key: str) -> float | None:
     group, _, name = key.rpartition(".")
     value = (metrics.get(group) or {}).get(name) if group else metrics.get(name)
     return float(value) if isinstance(value, int | float) else None
+
+
+def comparison_lines(found: Comparison) -> Iterator[str]:
+    """Yield a table for every run beside the first, then what differs in the configs."""
+    for i in range(1, len(found.gaits)):
+        yield from _against_base(found, i)
+        yield ""
+    if not found.config:
+        yield "The configs are the same."
+        return
+    yield "Config values that differ"
+    for key, values in found.config.items():
+        yield from _config_lines(key, found.names, values)
+
+
+def _config_lines(key: str, names: Sequence[str], values: Sequence[str]) -> Iterator[str]:
+    """Yield a key with the value of every run, in one line if it is short enough."""
+    pairs = list(zip(names, values, strict=True))
+    line = f" {key}: {', '.join(f'{value} ({name})' for name, value in pairs)}"
+    if len(line) <= _WIDTH:
+        yield line
+        return
+    yield f" {key}"
+    for name, value in pairs:
+        yield from wrap(f"{name}: {value}", _WIDTH, initial_indent=" " * 3,
+                        subsequent_indent=" " * 5)  # fmt: skip
+
+
+def _against_base(found: Comparison, which: int) -> Iterator[str]:
+    """Yield the table of one run beside the first."""
+    base, other = found.names[0], found.names[which]
+    yield f"{other} compared with {base}"
+    yield _line("", _cut(base), _cut(other), "change", "[%]", "unit")
+    for section, rows in groupby(found.rows, lambda row: row.measure.section):
+        yield section
+        for row in rows:
+            if not row.values[0] and not row.values[which]:  # orthoses that nobody wears
+                continue
+            measure, share = row.measure, row.shares[which]
+            yield _line(
+                measure.row,
+                measure.text(row.values[0]),
+                measure.text(row.values[which]),
+                measure.text(row.differences[which], sign=True),
+                "-" if share is None else f"{round(100.0 * share, 1) + 0.0:+.1f}",
+                measure.shown_unit,
+            )
+
+
+def _line(label: str, base: str, other: str, change: str, share: str, unit: str) -> str:
+    return f" {label:<26}{base:>11} {other:>11}{change:>10}{share:>9}  {unit}".rstrip()
+
+
+def _cut(name: str) -> str:
+    """Return the end of a name as a heading of a narrow column."""
+    return name if len(name) <= _NAME else f"..{name[2 - _NAME :]}"
+
+
+def write_comparison_csv(path: Path, found: Comparison) -> None:
+    """Write a row per metric: value of every run, differences to the first, those also in %."""
+    names = found.names
+    header = ["metric", "unit", *names]
+    header += [f"{name} - {names[0]}" for name in names[1:]]
+    header += [f"{name} - {names[0]} [%]" for name in names[1:]]
+    rows = (
+        [
+            row.measure.key,
+            row.measure.unit,
+            *row.values,
+            *row.differences[1:],
+            *(None if share is None else 100.0 * share for share in row.shares[1:]),
+        ]
+        for row in found.rows
+    )
+    write_table(path, header, rows)
+
+
+def comparison_content(found: Comparison) -> dict[str, Any]:
+    """Return everything that was compared, ready for JSON; SI units, shares of 1."""
+    return {
+        "runs": [
+            {
+                "name": gait.name,
+                "problem": gait.problem,
+                "patient": gait.walker.patient.id,
+                "condition": gait.walker.condition,
+            }
+            for gait in found.gaits
+        ],
+        "base": found.names[0],
+        "metrics": {
+            row.measure.key: {
+                "unit": row.measure.unit,
+                "values": dict(zip(found.names, row.values, strict=True)),
+                "differences": dict(zip(found.names[1:], row.differences[1:], strict=True)),
+                "shares": dict(zip(found.names[1:], row.shares[1:], strict=True)),
+            }
+            for row in found.rows
+        },
+        "config": {
+            key: dict(zip(found.names, values, strict=True)) for key, values in found.config.items()
+        },
+        "notes": list(found.notes),
+    }

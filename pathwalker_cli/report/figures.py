@@ -7,16 +7,17 @@ from collections.abc import Callable, Sequence
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from pathwalker_cli.evaluation.cycle_curves import (
+from pathwalker_cli.evaluation.curves import (
     ACTIVATIONS,
     ANGLES,
     FORCES,
     MOMENTS,
     CycleCurve,
+    Trace,
     known_curves,
+    traces,
 )
 from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_handles
-from pathwalker_cli.evaluation.traces import Trace, lone_trace, traces
 from pathwalker_cli.inverse.evaluate import StudyTrial
 from pathwalker_cli.inverse.recorded_figures import joint_torque_figure, name_figure
 from pathwalker_cli.patient.blocks import SpringSet
@@ -114,7 +115,8 @@ def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
     """Return the gaits of the runs over their recordings."""
     gaits_recorded = [(run.evaluation.gait, run.evaluation.recorded) for run in runs]
     if len(gaits_recorded) == 1:
-        return (lone_trace(*gaits_recorded[0]),)
+        gait, behind = gaits_recorded[0]
+        return (Trace(gait, gait.problem, behind),)
     gaits, recorded = zip(*gaits_recorded, strict=True)
     return traces(gaits, [run.label for run in runs], recorded)
 

@@ -6,19 +6,19 @@ from collections.abc import Sequence
 
 from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
 from pathwalker_cli.evaluation.evaluate import Change
-from pathwalker_cli.evaluation.text import number_text
+from pathwalker_cli.evaluation.tables import spread_text
 from pathwalker_cli.report.assumptions import assumption_section
-from pathwalker_cli.report.content import Fact, Page
+from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
 from pathwalker_cli.report.figures import curve_section
 from pathwalker_cli.report.folders import Study
-from pathwalker_cli.report.gait_table import gait_section
 from pathwalker_cli.report.runs import ReportRun, changes_of
 from pathwalker_cli.report.springs import prescribed, recommended, spring_section
 from pathwalker_cli.report.study_tables import study_section
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.stride.measure import KNEE, Measure
+from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.verdict_text import snapped_warning
 
-__all__ = ["gait_page"]
+__all__ = ["gait_page", "gait_section"]
 
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
@@ -64,7 +64,7 @@ def _of_runs(runs: Sequence[ReportRun]) -> list[Fact]:
 def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
     """Return what a run says in one sentence."""
     row = run.evaluation.row
-    speed = number_text(row("walking_speed").value, row("walking_speed").quantity)
+    speed = row("walking_speed").measure.text(row("walking_speed").value)
     knees = " and ".join(
         f"{to_degrees(row(f'min_stance_knee_flexion_{side}').value or 0.0):.1f} deg {side}"
         for side in SIDES
@@ -72,10 +72,10 @@ def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
     gait = f"at {speed} m/s with a least stance knee flexion of {knees}"
     if not run.worn:
         return f"Predicted {run.label} gait walks {gait}."
-    effort = next((c for c in changes if c.quantity.key == "effort_per_distance"), None)
+    effort = next((c for c in changes if c.measure.key == "effort_per_distance"), None)
     saved = ""
     if effort is not None:
-        values = [number_text(v, effort.quantity) for v in (effort.barefoot, effort.orthosis)]
+        values = [effort.measure.text(v) for v in (effort.barefoot, effort.orthosis)]
         share = 100.0 * effort.value / effort.barefoot
         saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot ({share:+.0f} %)"
     real = run.verdict is not None and run.verdict.snapped is not None
@@ -128,3 +128,60 @@ def _coarse(run: ReportRun) -> bool:
     asked = {"position": mesh.position_tolerance, "velocity": mesh.velocity_tolerance}
     reached = {kind: run.run.metrics.get(f"reintegration_{kind}_error") for kind in asked}
     return any(value is not None and value > asked[kind] for kind, value in reached.items())
+
+
+def gait_section(runs: Sequence[ReportRun], changes: Sequence[Change]) -> Section:
+    """Return the table of steps, times, crouch, forces and effort.
+
+    Args:
+        runs: The runs.
+        changes: From barefoot to orthosis; none where there are not both.
+    """
+    head, columns = ["", "unit"], "ww"
+    for run in runs:
+        head += [run.label, *(["recorded, mean [min, max]", "is"] if _compared(run) else [])]
+        columns += "nnw" if _compared(run) else "n"
+    if changes:
+        head += ["change", "[%]", "recorded change"]
+        columns += "nnn"
+    rows = [_row(measure, runs, changes) for measure in measures_in("report")]
+    notes = ["BW: body weight with what is worn; is: below, in or above the recorded range"]
+    notes += [note for run in runs for note in run.evaluation.notes]
+    found = tuple(row for row in rows if row is not None)
+    table = Table(tuple(head), found, notes=tuple(dict.fromkeys(notes)), columns=columns)
+    return Section("Gait", tables=(table,))
+
+
+def _compared(run: ReportRun) -> bool:
+    return run.evaluation.recorded is not None
+
+
+def _row(measure: Measure, runs: Sequence[ReportRun], changes: Sequence[Change]) -> Row | None:
+    """Return the row of a measure, None if no run tells it."""
+    found = [
+        next((row for row in run.evaluation.rows if row.measure.key == measure.key), None)
+        for run in runs
+    ]
+    if not any(found):
+        return None
+    label = measure.label.replace("flexion", "flexion (crouch)", measure.section == KNEE)
+    cells = [label, measure.shown_unit]
+    for run, row in zip(runs, found, strict=True):
+        cells.append(measure.text(row.value if row else None))
+        if _compared(run):
+            cells.append(spread_text(row.recorded if row else None, measure))
+            cells.append((row.position or "") if row else "")
+    if changes:
+        cells += _change_cells(next((c for c in changes if c.measure.key == measure.key), None))
+    return Row(tuple(cells))
+
+
+def _change_cells(change: Change | None) -> tuple[str, str, str]:
+    """Return the change, its share and the recorded one."""
+    if change is None:
+        return "-", "-", "-"
+    share = f"{100.0 * change.value / change.barefoot:+.0f}" if change.barefoot else "-"
+    measure = change.measure
+    return (
+        measure.text(change.value, sign=True), share, measure.text(change.recorded, sign=True)
+    )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import Final
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.report.content import Fact, Row, Section, Table
 from pathwalker_cli.report.runs import ReportRun
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, NumberVerdict, Verdict
 from pathwalker_cli.studies.verdict_text import (
     PRESCRIBED,
@@ -106,7 +106,7 @@ def _facts(verdict: Verdict) -> list[Fact]:
     """Return what the table has no room for."""
     snapped = verdict.snapped
     if snapped is None:
-        real = "the patient's file lists none that can be bought (orthosis.names)"
+        real = "the patient's file lists none that can be bought (orthosis.springs)"
     elif snapped.status == "converged":
         real = (
             f"solved again with these: cost {100 * snapped.rise:+.2g} %, "

@@ -9,8 +9,8 @@ import numpy as np
 
 from pathwalker_cli.io.csv_file import read_rows
 from pathwalker_cli.report.folders import Study
+from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
-from pathwalker_cli.studies.measures import MEASURES, measure_of
 from pathwalker_cli.studies.springs import Ranges
 from pathwalker_cli.studies.uncertainty.result import Spread
 
@@ -37,7 +37,7 @@ def landscape_of(study: Study) -> Landscape:
             status=row["status"],
             iterations=0,
             seconds=0.0,
-            measures={m.key: float(row[m.key]) for m in MEASURES if row.get(m.key)},
+            measures={m.key: float(row[m.key]) for m in measures_in("studies") if row.get(m.key)},
         )
         for row in rows
     )

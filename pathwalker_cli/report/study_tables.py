@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.report.content import Row, Section, Table
 from pathwalker_cli.report.figures import landscape_drawing, spread_drawing, tradeoff_drawing
@@ -15,9 +15,9 @@ from pathwalker_cli.report.folders import Study
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.springs import recommended
 from pathwalker_cli.report.study_files import Spreads, landscape_of, spreads_of
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.landscape.figures import Chosen
-from pathwalker_cli.studies.measures import COMPARED, MEASURES, measure_of
+from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.sensitivity.text import label_of
 from pathwalker_cli.studies.tradeoff.files import tradeoff_of_content
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
@@ -58,7 +58,9 @@ def _sensitivity(study: Study, run: ReportRun) -> Section:
     """Return what one per cent more of every number changes."""
     elasticities: Mapping[str, Mapping[str, Any]] = study.content["elasticities"]
     shown = [
-        m for m in MEASURES if any(_moves(values.get(m.key)) for values in elasticities.values())
+        m
+        for m in measures_in("studies")
+        if any(_moves(values.get(m.key)) for values in elasticities.values())
     ]
     rows = []
     for place, values in elasticities.items():
@@ -140,10 +142,10 @@ def _chosen(run: ReportRun, side: str) -> Chosen:
     """Return the real springs to take of a side, or of both."""
     if run.verdict is None or run.verdict.snapped is None:
         return {}
-    springs, sides = recommended(run), BOTH_SIDES if side == "both" else (side,)
+    springs, sides = recommended(run), SIDES if side == "both" else (side,)
     return {
         s: (springs[f"dorsiflexion_stiffness_{s}"], springs[f"plantarflexion_stiffness_{s}"])
-        for s in BOTH_SIDES
+        for s in SIDES
         if s in sides
     }
 
@@ -205,7 +207,7 @@ def _spread_row(spreads: Spreads, spread: Spread) -> Row:
     low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
     place = spreads.strongest.get(measure.key)
     return Row((
-        measure.label, "" if measure.unit == "1" else measure.shown_unit,
+        measure.label, measure.shown_unit,
         shown_text(measure, spread.base), middle, f"{low} to {high}",
         label_of(place) if place else "-",
     ))  # fmt: skip

@@ -7,7 +7,7 @@ from typing import Annotated, Final
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from pathwalker_cli.io.fields import invalid
-from pathwalker_cli.studies.measures import MEASURES
+from pathwalker_cli.stride.measures import measures_in
 
 __all__ = ["SUMMARIES"]
 
@@ -17,7 +17,7 @@ Pair = tuple[float, float]
 
 
 def _known(key: str) -> str:
-    if key not in {measure.key for measure in MEASURES}:
+    if key not in {measure.key for measure in measures_in("studies")}:
         raise invalid(f"is '{key}', which is no measure", allowed="a spring of the orthoses")
     return key
 

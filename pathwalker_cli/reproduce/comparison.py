@@ -9,16 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, to_degrees
-from pathwalker_cli.evaluation.angle_rms import JOINTS
-from pathwalker_cli.evaluation.numbers import recorded_numbers
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX, to_degrees
+from pathwalker_cli.evaluation.differences import JOINTS
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperNumber
-from pathwalker_cli.evaluation.recorded import RecordedGait
-from pathwalker_cli.evaluation.spread import Spread
+from pathwalker_cli.evaluation.recorded import RecordedGait, Spread, recorded_numbers
 from pathwalker_cli.inverse.bands import cycle_band
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce.results import InverseResult, ProblemResult, Results
-from pathwalker_cli.stride.cycle import BOTH_SIDES
 
 __all__ = ["Ours", "Row", "all_rows"]
 
@@ -192,7 +189,7 @@ def _ours(number: PaperNumber, results: Results, spreads: Spreads) -> Ours | str
         name = number.quantity.removeprefix("max_isometric_torque_")
         return Ours(float(strengths[GENERATORS.index(name)]))
     if number.subject == "change":
-        values = {change.quantity.key: change.value for change in results.changes}
+        values = {change.measure.key: change.value for change in results.changes}
         why = "mapd-barefoot and mapd-orthosis did not both converge"
         return _known(values.get(number.quantity), why)
     if number.subject in results.problems:
@@ -220,7 +217,7 @@ def _inverse(number: PaperNumber, result: InverseResult, results: Results) -> Ou
     )
     if name != "over_peak_force" or largest is None:
         return known(largest)
-    curves = [c for g in results.recorded.values() for s in BOTH_SIDES for c in g.stance_forces(s)]
+    curves = [c for g in results.recorded.values() for s in SIDES for c in g.stance_forces(s)]
     if not curves:
         return "not computed: no forces"
     peak = float(np.mean([curve[:, 1].max() for curve in curves]))
@@ -231,7 +228,7 @@ def _gait(number: PaperNumber, result: ProblemResult) -> Ours | str:
     """Return a number of a solved problem."""
     if result.evaluation is None:
         return f"not computed: {result.problem} did not converge"
-    values = {row.quantity.key: row.value for row in result.evaluation.rows}
+    values = {row.measure.key: row.value for row in result.evaluation.rows}
     values["seconds_solve"] = result.metrics["seconds_solve"]
     values["walking_speed_weight"] = result.config.cost.walking_speed_weight
     return _known(values.get(number.quantity), "the run does not tell")
@@ -253,7 +250,7 @@ def _recorded(number: PaperNumber, results: Results, spreads: Spreads) -> Ours |
 def _largest_deviation(recorded: RecordedGait) -> Ours:
     """Return the largest standard deviation over the cycle of the least and greatest joint."""
     largest = {"pelvis": 0.0, "hip": 0.0, "knee": 0.0, "ankle": 0.0}
-    for side in BOTH_SIDES:
+    for side in SIDES:
         band = cycle_band([(trial.motion, trial.cycles) for trial in recorded.trials], side)
         for joint in largest:
             names = [n for n in JOINTS[joint] if len(JOINTS[joint]) == 1 or n[-1] == SUFFIX[side]]
@@ -274,15 +271,14 @@ def _why(number: PaperNumber, results: Results) -> str:
         parts += [
             f"to the mean recorded gait cycle ours is {float(to_degrees(row.value)):.2f}"
             for row in result.evaluation.rows
-            if row.quantity.key == key and row.value is not None
+            if row.measure.key == key and row.value is not None
         ]
     return "; ".join(part for part in parts if part)
 
 
 def _resting(number: PaperNumber, result: ProblemResult) -> str:
     """Return that a quantity sits at its bound in this run, "" if it does not."""
-    for bound in result.metrics["active_bounds"]:
-        name, side, value, *_ = f"{bound} ".split(" ")
-        if name == number.quantity and side in ("lower", "upper"):
-            return f"ours rests on its {side} bound, {value} {number.unit}"
+    for bound in result.bounds:
+        if bound.name == number.quantity:
+            return f"ours rests on its {bound.side} bound, {bound.value:.4g} {number.unit}"
     return ""

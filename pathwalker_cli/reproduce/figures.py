@@ -14,12 +14,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SUFFIX, Side, to_degrees
-from pathwalker_cli.evaluation.figures import ankle_figure, ground_force_figure, joint_angle_figure
-from pathwalker_cli.evaluation.traces import Trace, lone_trace
+from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side, to_degrees
+from pathwalker_cli.evaluation.curves import ANGLES, FORCES, CycleCurve, Trace
+from pathwalker_cli.evaluation.figures import ankle_figure, cycle_figure
 from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.reproduce.results import ProblemResult, Results
-from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
 from pathwalker_cli.stride.figures import orthosis_curves
 from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION
 from pathwalker_cli.stride.figures.save import save_formats
@@ -33,6 +32,7 @@ from pathwalker_cli.stride.figures.style import (
     zero_line,
 )
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import own_cycle
 
 __all__ = ["save_paper_figures"]
 
@@ -93,8 +93,8 @@ def _plans(results: Results) -> Iterator[_Plan]:
             "Figure 2: torque over angle of the orthoses, with the springs of MAPD-Orthosis.",
             lambda: orthosis_curves(springs),
         )
-    yield from _kinds(solved, "figure-3", "joint angles", joint_angle_figure)
-    yield from _kinds(solved, "figure-4", "ground reaction forces", ground_force_figure)
+    yield from _kinds(solved, "figure-3", "joint angles", ANGLES)
+    yield from _kinds(solved, "figure-4", "ground reaction forces", FORCES)
     if {"mapd-barefoot", "mapd-orthosis"} <= solved.keys():
         gaits = tuple(_series(solved[name]) for name in ("mapd-barefoot", "mapd-orthosis"))
         yield _Plan(
@@ -119,7 +119,7 @@ def _plans(results: Results) -> Iterator[_Plan]:
 
 
 def _kinds(
-    solved: Mapping[str, ProblemResult], name: str, what: str, make: Callable[[Trace], Figure]
+    solved: Mapping[str, ProblemResult], name: str, what: str, curves: Sequence[CycleCurve]
 ) -> Iterator[_Plan]:
     """Yield one figure per problem of what the article shows in one figure."""
     number = name.replace("figure-", "Figure ")
@@ -129,7 +129,7 @@ def _kinds(
             beyond = " (not in the article's main text)" if problem in _BEYOND else ""
             band = "" if trace.recorded is None else ", over the recorded range"
             caption = f"{number}, {_NAMES[problem]}{beyond}: {what}{band}."
-            yield _Plan(f"{name}-{problem}", caption, partial(make, trace))
+            yield _Plan(f"{name}-{problem}", caption, partial(cycle_figure, trace, curves))
 
 
 def _series(result: ProblemResult) -> GaitSeries:
@@ -143,7 +143,8 @@ def _trace(result: ProblemResult) -> Trace:
     """Return the gait of a converged problem over the recordings."""
     if result.evaluation is None:
         raise ValueError(f"{result.problem} did not converge")
-    return lone_trace(result.evaluation.gait, result.evaluation.recorded)
+    gait = result.evaluation.gait
+    return Trace(gait, gait.problem, result.evaluation.recorded)
 
 
 _BAREFOOT: Final = {"color": "#D55E00", "linestyle": "--"}
@@ -198,7 +199,7 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
     """
     fig = new_figure(4.2)
     grid = fig.subplots(3, 2, sharex=True, sharey="row")
-    for column, side in enumerate(BOTH_SIDES):
+    for column, side in enumerate(SIDES):
         for ax, joint in zip(grid[:, column], LEG_JOINTS, strict=True):
             dress(ax, f"{side.capitalize()} {joint}", y="" if column else _TORQUE)
             zero_line(ax)
@@ -208,7 +209,7 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
                     torque = series.muscle_torque[:, GENERATORS.index(name)]
                     _draw(ax, series, side, EXTENSION[joint] * torque, look)
             if joint == "ankle":
-                own = orthosis.orthosis_torque[:, BOTH_SIDES.index(side)]
+                own = orthosis.orthosis_torque[:, SIDES.index(side)]
                 _draw(ax, orthosis, side, own, {"color": NEUTRAL, "linewidth": 0.7})
             percent_axis(ax, *([] if joint == LEG_JOINTS[-1] else [""]))
     thin = Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis")
@@ -225,7 +226,7 @@ def activation_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
     """
     fig = new_figure(3.8)
     grid = fig.subplots(3, 4, sharex=True, sharey=True)
-    columns = [(side, direction) for side in BOTH_SIDES for direction in _DIRECTIONS]
+    columns = [(side, direction) for side in SIDES for direction in _DIRECTIONS]
     for row, joint in zip(grid, LEG_JOINTS, strict=True):
         for ax, (side, direction) in zip(row, columns, strict=True):
             name = f"{joint}_{direction}_{SUFFIX[side]}"

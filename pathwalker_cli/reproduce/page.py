@@ -9,7 +9,6 @@ from typing import Any, Final
 from pathwalker_cli.conventions import COORDINATES, STIFFNESSES
 from pathwalker_cli.evaluation.evaluate import Change
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperClaim, PaperNumber
-from pathwalker_cli.evaluation.quantities import quantity_of
 from pathwalker_cli.reproduce.comparison import Row, all_rows
 from pathwalker_cli.reproduce.results import METHODS, ProblemResult, Results
 from pathwalker_cli.reproduce.words import (
@@ -162,14 +161,14 @@ def _change_lines(changes: Sequence[Change]) -> Iterator[str]:
     for change in changes:
         if change.paper is None:
             continue
-        quantity = quantity_of(change.quantity.key)
+        measure = change.measure
         paper = change.paper
         rises = paper.rises if isinstance(paper, PaperClaim) else paper.value > 0.0
         moved = abs(change.value) > _UNCHANGED * abs(change.barefoot)
         same = ("yes" if (change.value > 0.0) == rises else "no") if moved else "no, unchanged"
         cells.append(
             (
-                f"{quantity.section.lower()}: {quantity.label} [{quantity.unit}]",
+                f"{measure.section.lower()}: {measure.row} [{measure.unit}]",
                 "rises" if rises else "falls",
                 plain(change.barefoot, ".3f"),
                 plain(change.orthosis, ".3f"),
@@ -228,7 +227,6 @@ _SOLVE: Final[dict[str, Callable[[Metrics], str]]] = {
     "re-integration error [rad/s or m/s]": _pair(".1e", "reintegration_velocity_error"),
 }
 _GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
-    "active bounds that shape the gait": lambda m: str(len(_shaping_bounds(m))),
     "walking speed [m/s]": _pair(".3f", "walking_speed"),
     "step length left, right [m]": _sides("step_length", ".3f"),
     "least knee flexion of stance left, right [deg]": _knees,
@@ -242,9 +240,9 @@ _GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
 """Rows of the table: what a solve says, and what its gait says if it converged."""
 
 
-def _shaping_bounds(metrics: Metrics) -> list[str]:
+def _shaping_bounds(result: ProblemResult) -> list[str]:
     """Return the active bounds that are choices which shape the gait."""
-    return [bound for bound in metrics["active_bounds"] if bound.split(" ")[0] in _SHAPING]
+    return [str(bound) for bound in result.bounds if bound.name in _SHAPING]
 
 
 def problem_lines(results: Results) -> Iterator[str]:
@@ -253,6 +251,8 @@ def problem_lines(results: Results) -> Iterator[str]:
     rows = [("this call", *("kept" if each.kept else "solved now" for each in problems.values()))]
     for name, show in _SOLVE.items():
         rows.append((name, *(show(each.metrics) for each in problems.values())))
+    counts = (str(len(_shaping_bounds(p))) if p.converged else "-" for p in problems.values())
+    rows.append(("active bounds that shape the gait", *counts))
     for name, show in _GAIT.items():
         shown = (show(each.metrics) if each.converged else "-" for each in problems.values())
         rows.append((name, *(text.replace("-, -", "-") for text in shown)))
@@ -263,7 +263,7 @@ def problem_lines(results: Results) -> Iterator[str]:
     yield "Active bounds that shape the gait:"
     yield ""
     for name, each in problems.items():
-        bounds = "; ".join(_shaping_bounds(each.metrics)) or "none"
+        bounds = "; ".join(_shaping_bounds(each)) or "none"
         yield f"- {name}: {bounds if each.converged else 'did not converge'}"
 
 

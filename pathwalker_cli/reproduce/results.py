@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,15 +14,16 @@ from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.paper import PATIENT
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
-from pathwalker_cli.evaluation.run import gait_of_series
 from pathwalker_cli.inverse.evaluate import dynamics_trials
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, load_inverse_dynamics
 from pathwalker_cli.inverse.study_tables import residual_tables, strength_table
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.model.walker import build_walker
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.stride import stride_of
 
 __all__ = [
     "METHODS",
@@ -136,6 +137,7 @@ class ProblemResult:
     Args:
         problem: Its name.
         metrics: Content of `metrics.json`.
+        bounds: Bounds that hold the solution back.
         config: The config that was solved.
         kept: Whether it was solved before and not again.
         series: The stride, None if it did not converge.
@@ -144,6 +146,7 @@ class ProblemResult:
 
     problem: str
     metrics: Mapping[str, Any]
+    bounds: tuple[ActiveBound, ...]
     config: StudyConfig
     kept: bool
     series: GaitSeries | None = None
@@ -207,11 +210,11 @@ def evaluated(
     """
     run = load_run(folder, allow_unconverged=True)
     config, metrics = run.config, run.metrics
-    result = ProblemResult(config.problem, metrics, config, kept)
+    result = ProblemResult(config.problem, metrics, run.result.bounds, config, kept)
     if metrics["status"] != "converged":
         return result
     series = gait_series(run.case.walker(), run.motion)
-    gait = gait_of_series(series, config.problem, config.problem, metrics["effort"])
+    gait = stride_of(series, config.problem, config.problem)
     theirs = recorded.get(config.condition) if run.case.patient.id == PATIENT else None
     evaluation = evaluate_gait(gait, recorded=theirs)
-    return ProblemResult(config.problem, metrics, config, kept, series, evaluation)
+    return replace(result, series=series, evaluation=evaluation)

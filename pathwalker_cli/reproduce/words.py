@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from typing import Final
 
 from pathwalker_cli.conventions import to_degrees
+from pathwalker_cli.evaluation.evaluate import compared
 from pathwalker_cli.evaluation.paper import PaperNumber
-from pathwalker_cli.evaluation.quantities import QUANTITIES
 from pathwalker_cli.reproduce.comparison import Ours, Row
 
 __all__ = ["degrees", "deviation", "label", "ours_text", "plain", "printed", "subject", "table"]
@@ -34,7 +34,7 @@ _SUBJECTS: Final = {
     "literature": "earlier predictions of others",
 }
 
-_QUANTITIES: Final = {quantity.key: quantity.label for quantity in QUANTITIES} | {
+_QUANTITIES: Final = {measure.key: measure.row for measure in compared()} | {
     "min_stance_knee_flexion_left": "least knee flexion of stance, left",
     "min_stance_knee_flexion_right": "least knee flexion of stance, right",
     "rms_vertical_force_stance": "vertical ground force, RMS difference",

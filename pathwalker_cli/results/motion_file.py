@@ -1,4 +1,4 @@
-"""The exact motion of a run as `motion.npz`, so that another solve can begin with it."""
+"""The exact motion and the multipliers of a run, so that another solve can begin with them."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
+from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
-__all__ = ["read_arrays", "read_motion", "write_motion"]
+__all__ = ["read_arrays", "read_motion", "read_multipliers", "write_motion", "write_multipliers"]
 
 _ARRAYS: Final = (
     "mesh", "states", "smooth", "controls", "integrals", "inner_states", "algebraic"
@@ -77,6 +78,27 @@ def read_motion(path: str | Path) -> PhasedMotion:
         raise DataError(f"holds no numbers: {problem}", where=str(path), mend=_AGAIN) from None
     _check(motion, path)
     return motion
+
+
+def write_multipliers(path: str | Path, multipliers: Multipliers) -> None:
+    """Write the multipliers of the bounds on the unknowns and of the rows."""
+    with Path(path).open("wb") as file:
+        np.savez(file, unknowns=multipliers.unknowns, rows=multipliers.rows, allow_pickle=False)
+
+
+def read_multipliers(path: str | Path) -> Multipliers:
+    """Read multipliers.
+
+    Raises:
+        DataError: If the file is missing, damaged or holds something else.
+    """
+    arrays = read_arrays(Path(path))
+    found = [arrays.get(name) for name in ("unknowns", "rows")]
+    if any(k is None or k.ndim != 1 or k.dtype.kind != "f" for k in found):
+        raise DataError("holds no multipliers", where=str(path), mend=_AGAIN)
+    if not all(np.isfinite(k).all() for k in found if k is not None):
+        raise DataError("holds values that are not finite", where=str(path), mend=_AGAIN)
+    return Multipliers(arrays["unknowns"], arrays["rows"])
 
 
 def read_arrays(path: Path) -> Mapping[str, np.ndarray]:

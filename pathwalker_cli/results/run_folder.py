@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,20 +30,22 @@ from pathwalker_cli.model.walker import unknowns_of
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.patient import load_patient, recordings_beside
-from pathwalker_cli.results.metrics_model import RunMetrics
-from pathwalker_cli.results.motion_file import read_motion, write_motion
-from pathwalker_cli.results.multipliers_file import read_multipliers, write_multipliers
-from pathwalker_cli.results.run_metrics import (
-    METRICS_HASH,
+from pathwalker_cli.results.metrics import (
     RUN_FORMAT,
     RunInputs,
-    metrics_hash,
+    RunMetrics,
     run_inputs,
     run_metrics,
     sha256,
 )
-from pathwalker_cli.results.solve_text import shortfall_text
+from pathwalker_cli.results.motion_file import (
+    read_motion,
+    read_multipliers,
+    write_motion,
+    write_multipliers,
+)
 from pathwalker_cli.results.tables import TABLES
+from pathwalker_cli.results.text import shortfall_text
 from pathwalker_cli.stride.figures import save_figures
 from pathwalker_cli.stride.series import GaitSeries
 
@@ -81,7 +84,7 @@ class Run:
 
     Args:
         folder: Where it stands.
-        metrics: Content of `metrics.json`.
+        metrics: Content of `metrics.json`, by key.
         motion: The exact motion.
         case: The config with all defaults filled in, and the patient that the folder keeps.
         multipliers: Multipliers of the solution by collocation; None if they were not kept.
@@ -92,6 +95,11 @@ class Run:
     motion: PhasedMotion
     case: Case
     multipliers: Multipliers | None = None
+
+    @cached_property
+    def result(self) -> RunMetrics:
+        """The same metrics, typed."""
+        return RunMetrics.model_validate(self.metrics)
 
     @property
     def config(self) -> StudyConfig:
@@ -132,24 +140,23 @@ def write_run(
     """
     case = solution.case
     inputs = inputs or run_inputs(case)
-    metrics = run_metrics(solution, inputs)
-    metrics |= more or {}
+    result = run_metrics(solution, inputs, more)
     with _staged(Path(folder)) as staging:
         (staging / CONFIG).write_text(config_text(case.config), encoding="utf-8")
         (staging / PATIENT).write_text(case.patient_text, encoding="utf-8")
         _keep_recording(staging, solution)
         (staging / "log.txt").write_text("".join(f"{line}\n" for line in log), encoding="utf-8")
         write_motion(staging / _MOTION, solution.last_motion)
-        metrics["motion_hash"] = sha256((staging / _MOTION).read_bytes())
+        result.motion_hash = sha256((staging / _MOTION).read_bytes())
         if solution.converged and solution.config.transcription == "collocation":
             write_multipliers(staging / _MULTIPLIERS, solution.nlp.multipliers)
-            metrics["multipliers_hash"] = sha256((staging / _MULTIPLIERS).read_bytes())
+            result.multipliers_hash = sha256((staging / _MULTIPLIERS).read_bytes())
         _write_series(staging, solution.last_iterate)
         if not solution.converged:
             (staging / _SEAL).write_text(_seal(solution), encoding="utf-8")
-        metrics[METRICS_HASH] = metrics_hash(metrics)
-        write_json(staging / _METRICS, metrics)
-    return metrics
+        content = result.content()
+        write_json(staging / _METRICS, content)
+    return content
 
 
 def _keep_recording(folder: Path, solution: GaitSolution) -> None:

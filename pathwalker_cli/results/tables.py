@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -17,23 +19,14 @@ from pathwalker_cli.conventions import (
     coordinate_unit,
     velocity_unit,
 )
+from pathwalker_cli.io.atomic import atomic_path
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.trajectory_csv import write_trajectory
-from pathwalker_cli.stride.feet import centre_of_pressure
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import centre_of_pressure
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = [
-    "TABLES",
-    "controls_table",
-    "forces_table",
-    "states_table",
-    "torques_table",
-    "write_controls_csv",
-    "write_forces_csv",
-    "write_states_csv",
-    "write_torques_csv",
-]
+__all__ = ["DIGITS", "TABLES", "controls_table", "forces_table", "states_table", "torques_table"]
 
 DIGITS: Final = 9
 """Significant digits: finer than the solver's tolerance, so nothing is lost on the way."""
@@ -44,22 +37,20 @@ Column = tuple[str, str, np.ndarray]
 
 def states_table(series: GaitSeries) -> Trajectory:
     """Return coordinates, velocities and activations over time."""
-    q, v, activation = series.q.T, series.v.T, series.activation.T
     return _table(
         series,
-        [(n, coordinate_unit(n), x) for n, x in zip(COORDINATES, q, strict=True)]
-        + [(f"{n}_velocity", velocity_unit(n), x) for n, x in zip(COORDINATES, v, strict=True)]
-        + [(f"{n}_activation", "1", x) for n, x in zip(GENERATORS, activation, strict=True)],
+        _columns(COORDINATES, "", coordinate_unit, series.q),
+        _columns(COORDINATES, "_velocity", velocity_unit, series.v),
+        _columns(GENERATORS, "_activation", "1", series.activation),
     )
 
 
 def controls_table(series: GaitSeries) -> Trajectory:
     """Return excitations and activation rates over time."""
-    excitation, rate = series.excitation.T, series.activation_rate.T
     return _table(
         series,
-        [(f"{n}_excitation", "1", x) for n, x in zip(GENERATORS, excitation, strict=True)]
-        + [(f"{n}_activation_rate", "1/s", x) for n, x in zip(GENERATORS, rate, strict=True)],
+        _columns(GENERATORS, "_excitation", "1", series.excitation),
+        _columns(GENERATORS, "_activation_rate", "1/s", series.activation_rate),
     )
 
 
@@ -69,67 +60,64 @@ def forces_table(series: GaitSeries) -> Trajectory:
     Per contact point, summed per foot, and the forward position of each foot's centre of pressure,
     NaN where the foot is not loaded.
     """
-    columns: list[Column] = [
-        (name, "N", force) for name, force in zip(CONTACT_FORCES, series.force.T, strict=True)
-    ]
+    feet: list[Column] = []
     for side in SIDES:
-        columns += [
+        feet += [
             (f"foot_{SUFFIX[side]}_x", "N", series.forward_force(side)),
             (f"foot_{SUFFIX[side]}_z", "N", series.vertical_force(side)),
             (f"centre_of_pressure_{SUFFIX[side]}_x", "m", centre_of_pressure(series, side)),
         ]
-    return _table(series, columns)
+    return _table(series, _columns(CONTACT_FORCES, "", "N", series.force), feet)
 
 
 def torques_table(series: GaitSeries) -> Trajectory:
     """Return torques of generators and orthoses and their sum per joint over time."""
-    muscle, orthosis, net = series.muscle_torque.T, series.orthosis_torque.T, series.net_torque.T
-    joints = [(i, name) for i, name in enumerate(COORDINATES) if name not in ROOT]
+    orthoses = [f"orthosis_{SUFFIX[side]}" for side in SIDES]
+    joints = [name for name in COORDINATES if name not in ROOT]
+    net = series.net_torque[:, [COORDINATES.index(name) for name in joints]]
     return _table(
         series,
-        [(f"{n}_torque", "N m", x) for n, x in zip(GENERATORS, muscle, strict=True)]
-        + [
-            (f"orthosis_{SUFFIX[side]}_torque", "N m", x)
-            for side, x in zip(SIDES, orthosis, strict=True)
-        ]
-        + [(f"{name}_net_torque", "N m", net[i]) for i, name in joints],
+        _columns(GENERATORS, "_torque", "N m", series.muscle_torque),
+        _columns(orthoses, "_torque", "N m", series.orthosis_torque),
+        _columns(joints, "_net_torque", "N m", net),
     )
 
 
-def write_states_csv(path: str | Path, series: GaitSeries) -> None:
+def _columns(
+    names: Iterable[str], end: str, unit: str | Callable[[str], str], values: np.ndarray
+) -> list[Column]:
+    """Return the columns of an array, shape (n, m), each named and with its unit."""
+    return [
+        (f"{name}{end}", unit if isinstance(unit, str) else unit(name), column)
+        for name, column in zip(names, values.T, strict=True)
+    ]
+
+
+def _table(series: GaitSeries, *groups: list[Column]) -> Trajectory:
+    """Return columns as a trajectory."""
+    names, units, values = zip(*(column for group in groups for column in group), strict=True)
+    return Trajectory(series.time, names, np.column_stack(values), units)
+
+
+def _write_states(path: str | Path, series: GaitSeries) -> None:
     """Write time, phase, coordinates, velocities and activations."""
     table = states_table(series)
-    names = zip(table.names, table.units, strict=True)
-    rows = zip(table.time, series.phase, table.values, strict=True)
-    header = ["time [s]", "phase", *(f"{name} [{unit}]" for name, unit in names)]
-    write_table(path, header, ([time, phase, *values] for time, phase, values in rows))
+    names = (f"{name} [{unit}]" for name, unit in zip(table.names, table.units, strict=True))
+    rows = zip(table.time.tolist(), series.phase, table.values.tolist(), strict=True)
+    cells = ([time, phase, *values] for time, phase, values in rows)
+    write_table(Path(path), ["time [s]", "phase", *names], cells)
 
 
-def write_controls_csv(path: str | Path, series: GaitSeries) -> None:
-    """Write excitations and activation rates."""
-    write_trajectory(path, controls_table(series), DIGITS)
+def _write(table: Callable[[GaitSeries], Trajectory], path: str | Path, series: GaitSeries) -> None:
+    """Write a table in one stroke; no centre of pressure where a foot is not loaded."""
+    with atomic_path(path) as temporary:
+        write_trajectory(temporary, table(series), DIGITS)
 
 
-def write_forces_csv(path: str | Path, series: GaitSeries) -> None:
-    """Write ground reaction forces; no centre of pressure where a foot is not loaded."""
-    write_trajectory(path, forces_table(series), DIGITS)
-
-
-def write_torques_csv(path: str | Path, series: GaitSeries) -> None:
-    """Write torques of generators and orthoses and their sum per joint."""
-    write_trajectory(path, torques_table(series), DIGITS)
-
-
-TABLES: Final = {
-    "states.csv": write_states_csv,
-    "controls.csv": write_controls_csv,
-    "forces.csv": write_forces_csv,
-    "torques.csv": write_torques_csv,
+TABLES: Final[dict[str, Callable[[str | Path, GaitSeries], None]]] = {
+    "states.csv": _write_states,
+    "controls.csv": partial(_write, controls_table),
+    "forces.csv": partial(_write, forces_table),
+    "torques.csv": partial(_write, torques_table),
 }
 """File names and what writes them."""
-
-
-def _table(series: GaitSeries, columns: list[Column]) -> Trajectory:
-    """Return columns as a trajectory."""
-    names, units, values = zip(*columns, strict=True)
-    return Trajectory(series.time, names, np.column_stack(values), units)

@@ -1,9 +1,8 @@
-"""The short summary of a run on the terminal."""
+"""What a run says on the terminal: summary, proof, bounds, times, orthosis, and why it failed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -11,69 +10,75 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES, SUFFIX, to_degrees
+from pathwalker_cli.gait.shortfall import Shortfall
+from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
+from pathwalker_cli.ocp.violations import ActiveBound
+from pathwalker_cli.patient import OrthosisData
+from pathwalker_cli.stride.measures import TABLES, expanded, measure_of, measures_in
 
-__all__ = ["ActiveBound", "active_bounds", "summary", "summary_renderable", "summary_rows"]
+__all__ = [
+    "angle_words",
+    "bound_line",
+    "bound_lines",
+    "detail_lines",
+    "end_of",
+    "failure_text",
+    "interesting",
+    "notes_together",
+    "optimum_lines",
+    "orthosis_rows",
+    "shortfall_text",
+    "source_lines",
+    "spring_ends",
+    "spring_notes",
+    "summary",
+    "summary_renderable",
+    "summary_rows",
+]
 
-_ACTIVE: Final = 1e-3
+_AT_LIMIT: Final = 1e-3
 """Share of its range within which a value counts as sitting at a limit: interior-point solvers
 stay a little away from every bound, by far less than this."""
 
-_SYMBOLS: Final = {"dorsiflexion_stiffness": "K_D", "plantarflexion_stiffness": "K_P"}
-
 _WISH: Final = {"upper": "stiffer", "lower": "softer"}
 
-
-@dataclass(frozen=True)
-class ActiveBound:
-    """A free parameter that ended at the edge of its range.
-
-    Args:
-        name: What it is, in words, e.g. "K_D right".
-        end: "lower" or "upper".
-        limit: The limit.
-        unit: Its unit.
-    """
-
-    name: str
-    end: Literal["lower", "upper"]
-    limit: float
-    unit: str
-
-    def __str__(self) -> str:
-        """Say what it means for the result."""
-        return (
-            f"{self.name} sits at its {self.end} limit of {self.limit:.4g} {self.unit}: "
-            f"a {_WISH[self.end]} one would cost less"
-        )
+End = Literal["", "lower", "upper"]
 
 
-def active_bounds(
-    metrics: Mapping[str, Any], ranges: Mapping[str, tuple[float, float]]
-) -> tuple[ActiveBound, ...]:
-    """Return the orthosis stiffnesses that sit at an edge of their range.
+def end_of(value: float, limits: tuple[float, float]) -> End:
+    """Return the end of its range at which a number sits; "" inside, or where it has no choice."""
+    low, high = limits
+    margin = _AT_LIMIT * (high - low)
+    if low == high:
+        return ""
+    if value >= high - margin:
+        return "upper"
+    return "lower" if value <= low + margin else ""
+
+
+def spring_ends(
+    values: Mapping[str, Any], ranges: Mapping[str, tuple[float, float]]
+) -> dict[str, End]:
+    """Return the free springs that sit at an end of their range, and at which.
 
     Args:
-        metrics: `GaitMetrics.as_dict()`.
-        ranges: Per "dorsiflexion_stiffness" and "plantarflexion_stiffness", or per side, e.g.
-            "dorsiflexion_stiffness_left", lowest and highest allowed value [N m/rad].
+        values: Stiffness by spring [N m/rad]; other keys do no harm.
+        ranges: Lowest and highest allowed value by spring [N m/rad].
     """
-    found = []
-    for stem, symbol in _SYMBOLS.items():
-        for side in SIDES:
-            key = f"{stem}_{side}"
-            value, limits = metrics.get(key), ranges.get(key, ranges.get(stem))
-            if value is None or limits is None:
-                continue
-            low, high = limits
-            if low == high:
-                continue  # prescribed, not found
-            margin, name = _ACTIVE * (high - low), f"{symbol} {side}"
-            if value >= high - margin:
-                found.append(ActiveBound(name, "upper", high, "N m/rad"))
-            elif value <= low + margin:
-                found.append(ActiveBound(name, "lower", low, "N m/rad"))
-    return tuple(found)
+    known = {
+        name: end_of(values[name], ranges[name]) for name in ranges if values.get(name) is not None
+    }
+    return {name: end for name, end in known.items() if end}
+
+
+def spring_notes(values: Mapping[str, Any], ranges: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Return what it means for the result that springs sit at an end of their range."""
+    return [
+        f"{measure_of(name).label} sits at its {end} limit of {ranges[name][end == 'upper']:.4g} "
+        f"N m/rad: a {_WISH[end]} one would cost less"
+        for name, end in spring_ends(values, ranges).items()
+    ]
 
 
 def summary_rows(
@@ -82,7 +87,7 @@ def summary_rows(
     """Return label and value of every line of the summary.
 
     Args:
-        metrics: `GaitMetrics.as_dict()`.
+        metrics: Content of `metrics.json`.
         status: How the solve ended.
         cost: Value of the objective; left out without one.
     """
@@ -99,53 +104,279 @@ def summary_rows(
         ("step length", ", ".join(steps)),
         ("least knee flexion in stance", ", ".join(knees)),
     ]
-    for stem, symbol in _SYMBOLS.items():
-        for side in SIDES:
-            value = metrics.get(f"{stem}_{side}")
-            if value is not None:
-                text = f"{value:.1f} N m/rad ({np.deg2rad(value):.2f} N m/deg)"
-                rows.append((f"{symbol} {side}", text))
+    for name in STIFFNESSES:
+        if (value := metrics.get(name)) is not None:
+            text = f"{value:.1f} N m/rad ({np.deg2rad(value):.2f} N m/deg)"
+            rows.append((measure_of(name).label, text))
+    told = {key for m in TABLES["summary"] for key in expanded(m)}
+    for measure in measures_in("summary"):
+        if measure.key not in told and measure.key in metrics:
+            value = measure.text(metrics[measure.key])
+            rows.append((measure.label, f"{value} {measure.shown_unit}".rstrip()))
     return rows
 
 
-def summary(
-    metrics: Mapping[str, Any],
-    status: str,
-    cost: float | None = None,
-    bounds: Iterable[ActiveBound] = (),
-) -> str:
-    """Return the summary of a run as plain text.
-
-    Args:
-        metrics: `GaitMetrics.as_dict()`.
-        status: How the solve ended.
-        cost: Value of the objective; left out without one.
-        bounds: Active bounds, one line each.
-    """
-    rows = summary_rows(metrics, status, cost)
+def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = ()) -> str:
+    """Return labels and values as plain text, then what else to know, one line each."""
     width = max(len(label) for label, _ in rows)
     lines = [f"{label:<{width}}  {value}" for label, value in rows]
-    return "\n".join([*lines, *(f"note: {bound}" for bound in bounds)])
+    return "\n".join([*lines, *(f"note: {note}" for note in notes)])
 
 
 def summary_renderable(
-    metrics: Mapping[str, Any],
-    status: str,
-    cost: float | None = None,
-    bounds: Iterable[ActiveBound] = (),
+    rows: Sequence[tuple[str, str]], notes: Iterable[str] = ()
 ) -> RenderableType:
-    """Return the same summary for a `rich` console, which drops the colours off a terminal.
-
-    Args:
-        metrics: `GaitMetrics.as_dict()`.
-        status: How the solve ended.
-        cost: Value of the objective; left out without one.
-        bounds: Active bounds, one line each.
-    """
+    """Return the same for a `rich` console, which drops the colours off a terminal."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
-    for label, value in summary_rows(metrics, status, cost):
+    for label, value in rows:
         table.add_row(label, Text(value))
-    notes = (Text.assemble(("note: ", "yellow"), str(bound)) for bound in bounds)
-    return Group(table, *notes)
+    return Group(table, *(Text.assemble(("note: ", "yellow"), note) for note in notes))
+
+
+_ANGLES: Final = frozenset(COORDINATES[2:])
+_UNITS: Final = {"duration": "s", "walking_speed": "m/s", "distance": "m"}
+
+_MET: Final = 1e-6
+"""Violation up to which a constraint counts as met, each in its own unit."""
+
+
+def interesting(bound: ActiveBound) -> bool:
+    """Return whether a bound is a choice that shapes the gait: joint range, duration, speed."""
+    return bound.name in _ANGLES or bound.name in _UNITS or bound.name in STIFFNESSES
+
+
+def bound_lines(solution: GaitSolution) -> list[str]:
+    """Return one line per active bound of interest; stiffnesses have their own note.
+
+    The bounds of a solve that did not converge hold nothing back yet.
+    """
+    if not solution.converged:
+        return []
+    return [
+        bound_line(bound)
+        for bound in solution.active
+        if interesting(bound) and bound.name not in STIFFNESSES
+    ]
+
+
+def bound_line(bound: ActiveBound) -> str:
+    """Return an active bound in words."""
+    where = f" in {', '.join(bound.places)}" if bound.places else ""
+    if bound.name in _ANGLES:
+        amount = f"{bound.value:.3f} rad ({to_degrees(bound.value):.1f} deg)"
+    else:
+        amount = f"{bound.value:.4g} {_UNITS.get(bound.name, 'N m/rad')}"
+    name = {"duration": "phase duration"}.get(bound.name, bound.name)
+    if bound.name not in _ANGLES:
+        name = name.replace("_", " ")
+    return f"{name} at its {bound.side} bound {amount}{where}"
+
+
+def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return label and text of proof, active bounds, stages and times.
+
+    Args:
+        solution: How the solve ended.
+        metrics: Its metrics as they were written.
+    """
+    worst = solution.violations[0]
+    errors = solution.reintegration
+    again = f"{errors.worst_position:.1e} rad or m, {errors.worst_velocity:.1e} rad/s or m/s"
+    stages = (f"{s.name} {s.iterations} in {s.seconds:.1f} s" for s in solution.stages)
+    seconds = (f"{part} {metrics[f'seconds_{part}']:.1f}" for part in ("build", "solve", "verify"))
+    rows = [
+        ("cost terms", _sum_text(solution.cost_terms)),
+        ("clinical goals", ", ".join(f"{_words(n)} {v:.4g}" for n, v in metrics["goals"].items())),
+        ("largest violation", f"{worst.amount:.1e} ({worst.name})"),
+        ("re-integration error", again),
+        ("second engine", f"equations of motion met within {solution.second_engine:.1e} N or N m"),
+        ("balances", _balance_text(metrics["balance"])),
+        ("iterations", f"{', '.join(stages)}; {solution.last_motion.intervals} intervals at last"),
+        ("seconds", ", ".join(seconds)),
+        ("dynamics, start", f"{solution.walker.backend}, {solution.start}"),
+    ]
+    return [*rows, *(("active bound", line) for line in bound_lines(solution))]
+
+
+def _balance_text(found: Mapping[str, float]) -> str:
+    energy = f"{found['energy']:.1e} J of {found['work_scale']:.3g} J"
+    momentum = f"{found['impulse']:.1e} N s of {found['impulse_scale']:.3g} N s"
+    return f"work and energy within {energy}, forces and momentum within {momentum}"
+
+
+def _sum_text(terms: Mapping[str, float]) -> str:
+    """Return the terms that count, e.g. "effort per distance 0.2535 + walking speed -1.3"."""
+    return " + ".join(f"{_words(name)} {value:.4g}" for name, value in terms.items() if value)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def optimum_lines(optima: Sequence[LocalOptimum]) -> list[tuple[str, str]]:
+    """Return label and text of every local optimum, best first, and how far they lie apart."""
+    lines = []
+    for found in optima:
+        springs = ", ".join(f"{value:.1f}" for value in found.stiffness)
+        text = f"start {found.start}: cost {found.cost:.5g}, {found.walking_speed:.3f} m/s"
+        text += f", K_D r l, K_P r l {springs} N m/rad" if springs else ""
+        lines.append(("local optimum", text if found.converged else f"{text}, {found.status}"))
+    costs = [found.cost for found in optima if found.converged]
+    if len(costs) > 1:
+        near = sum(cost <= costs[0] + 0.05 * abs(costs[0]) for cost in costs)
+        spread = (costs[-1] - costs[0]) / abs(costs[0])
+        lines.append(
+            (
+                "local optima",
+                f"{len(costs)} of {len(optima)} starts converged, {near} within 5 % of the best; "
+                f"the worst is {100 * spread:.1f} % above",
+            )
+        )
+    return lines
+
+
+def source_lines(sources: Mapping[str, str]) -> list[str]:
+    """Return where the bounds come from, in short: equal reasons are said once.
+
+    Args:
+        sources: `GaitBounds.sources`.
+    """
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name, text in sources.items():
+        if name in _ANGLES:
+            key = ("joint ranges", text.partition("] rad, ")[2] or text)
+        elif name.startswith("duration"):
+            key = ("phase durations", text)
+        elif name in STIFFNESSES:
+            key = ("stiffness", text.partition(": ")[0])
+        else:
+            key = (name.replace("_", " "), text)
+        groups.setdefault(key, []).append(name.removeprefix("duration of "))
+    kinds = [kind for kind, _ in groups]
+    lines = []
+    for (kind, reason), names in groups.items():
+        several = kinds.count(kind) > 1
+        lines.append(f"{kind} of {', '.join(names)}: {reason}" if several else f"{kind}: {reason}")
+    return lines
+
+
+def failure_text(solution: GaitSolution, folder: str) -> str:
+    """Return one sentence about a solve that did not converge.
+
+    Args:
+        solution: How it ended.
+        folder: Where its files are.
+    """
+    why = solution.shortfall
+    parts = [] if why is None else [shortfall_text(why)]
+    if why is None or not why.too_weak:
+        parts.append(_violations_text(solution))
+    detail = "; ".join(parts)
+    return (
+        f"{solution.config.problem} did not converge: {solution.status}; {detail}; "
+        f"the last iterate is in {folder}, marked as not converged"
+    )
+
+
+def _violations_text(solution: GaitSolution) -> str:
+    """Return in words which constraints are not met, and how far off an integrator is."""
+    worst = [v for v in solution.violations if not v.amount <= _MET][:3]
+    if worst:
+        named = ", ".join(f"{v.name} by {v.amount:.2g}" for v in worst)
+        detail = f"the worst violations are {named}"
+    else:
+        largest = np.max([v.amount for v in solution.violations])
+        detail = f"all constraints are met within {largest:.1e}"
+    errors = solution.reintegration
+    if errors is not None:
+        detail += (
+            f", and an independent integrator misses the next node by "
+            f"{errors.worst_position:.1e} (rad, m) and {errors.worst_velocity:.1e} (rad/s, m/s)"
+        )
+    return detail
+
+
+def shortfall_text(shortfall: Shortfall) -> str:
+    """Return in words why no motion was found."""
+    if not shortfall.within_bounds:
+        return "not even muscles of any strength were found to walk within the bounds"
+    if not shortfall.missing:
+        return "the muscles are strong enough, so another start may lead to a solution"
+    lacking = [
+        f"{_in_words(missing.generator)} {missing.torque:.1f} N m beyond its "
+        f"{missing.strength:.1f} N m, at {missing.percent:.0f} % of the stride"
+        for missing in shortfall.missing[:3]
+    ]
+    more = len(shortfall.missing) - len(lacking)
+    others = f"; of {more} others a smaller share" if more else ""
+    return f"the least help with which a walk was found is {', '.join(lacking)}{others}"
+
+
+def _in_words(generator: str) -> str:
+    """Return e.g. "right ankle extension" for "ankle_extension_r"."""
+    stem, _, suffix = generator.rpartition("_")
+    side = next((side for side in SIDES if SUFFIX[side] == suffix), "")
+    return f"{side} {stem}".replace("_", " ") if side else generator.replace("_", " ")
+
+
+def notes_together(notes: Sequence[str]) -> tuple[str, ...]:
+    """Return what was filled in for a patient, lengths from body proportions in one sentence.
+
+    Args:
+        notes: Notes of the patient, one per number that was filled in.
+    """
+    begin = "segment length "
+    lengths = [note for note in notes if note.startswith(begin)]
+    names = ", ".join(note.removeprefix(begin).partition(":")[0] for note in lengths)
+    reason = lengths[0].partition(", ")[2] if lengths else ""
+    together = (f"segment lengths {names}: {reason}",) if lengths else ()
+    return (*together, *(note for note in notes if note not in lengths))
+
+
+_KINDS: Final = {"dorsiflexion": "K_D", "plantarflexion": "K_P"}
+
+
+def angle_words(angle: float) -> str:
+    """Return an ankle angle [rad, + plantarflexion] in degrees with its direction."""
+    degrees = f"{float(to_degrees(abs(angle))):.1f}"
+    if degrees == "0.0":
+        return "0 deg"
+    return f"{degrees} deg {'plantarflexion' if angle > 0.0 else 'dorsiflexion'}"
+
+
+def orthosis_rows(orthosis: OrthosisData) -> list[tuple[str, str]]:
+    """Return label and text of what is worn on each leg and which springs there are."""
+    mass = orthosis.mass
+    play = float(to_degrees(orthosis.free_play))
+    stops: dict[str, str] = {
+        side: f"{angle_words(orthosis.dorsiflexion_stop[side])} to "
+        f"{angle_words(orthosis.plantarflexion_stop[side])}"
+        for side in SIDES
+    }
+    if len(set(stops.values())) == 1:
+        stops = {" and ".join(SIDES): stops[SIDES[0]]}
+    rows = [
+        (
+            "orthosis",
+            f"per leg {mass.shank:g} kg on the shank, {mass.foot:g} kg on the foot; right and "
+            f"left: neutral angle {angle_words(orthosis.neutral_angle)}, play {play:.1f} deg "
+            f"around it, preload {orthosis.preload_torque:g} N m either way",
+        ),
+        *(("stops", f"{side}: {text}") for side, text in stops.items()),
+    ]
+    span = orthosis.stiffness_range
+    ranges = [f"{k} {_range(getattr(span, name))}" for name, k in _KINDS.items()]
+    rows.append(("springs", f"{', '.join(ranges)} N m/rad ({span.source})"))
+    if orthosis.springs is not None:
+        named = [
+            f"{k} " + ", ".join(f"{s.name} {s.stiffness:g}" for s in getattr(orthosis.springs, n))
+            for n, k in _KINDS.items()
+        ]
+        rows.append(("real springs", f"{'; '.join(named)} N m/rad ({orthosis.springs.source})"))
+    return rows
+
+
+def _range(pair: tuple[float, float]) -> str:
+    return f"{pair[0]:g} to {pair[1]:g}"

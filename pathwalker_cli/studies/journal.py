@@ -13,9 +13,9 @@ from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
+from pathwalker_cli.results.metrics import sha256
 from pathwalker_cli.results.motion_file import read_arrays
 from pathwalker_cli.results.run_folder import Run
-from pathwalker_cli.results.run_metrics import sha256
 
 __all__ = ["STOPPED", "Journal"]
 

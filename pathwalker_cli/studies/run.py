@@ -13,6 +13,7 @@ from pathwalker_cli.errors import DataError, InputError, NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp.watch import ProgressReport
+from pathwalker_cli.results.metrics import RunInputs, run_inputs
 from pathwalker_cli.results.run_folder import (
     Run,
     check_target,
@@ -20,7 +21,6 @@ from pathwalker_cli.results.run_folder import (
     warm_start_run,
     write_run,
 )
-from pathwalker_cli.results.run_metrics import RunInputs, run_inputs
 from pathwalker_cli.studies.verdict import Verdict, verdict_of
 from pathwalker_cli.studies.verdict_text import verdict_lines
 

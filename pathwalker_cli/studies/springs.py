@@ -10,7 +10,7 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.resolve import Optimum
 
-__all__ = ["Ranges", "Spring", "end_of", "ends", "free_springs", "require_springs", "spring_ranges"]
+__all__ = ["Ranges", "Spring", "free_springs", "require_springs", "spring_ranges"]
 
 Spring = Literal[
     "dorsiflexion_stiffness_right",
@@ -22,10 +22,6 @@ Spring = Literal[
 
 Ranges = Mapping[str, tuple[float, float]]
 """Least and largest stiffness by spring [N m/rad]."""
-
-NEAR_END: Final = 1e-3
-"""Share of its range within which a number sits at a limit: interior-point solvers stay a little
-away from every bound, by far less than this."""
 
 _COLLOCATION: Final = "collocation"
 
@@ -66,25 +62,3 @@ def spring_ranges(optimum: Optimum) -> dict[str, tuple[float, float]]:
 def free_springs(ranges: Ranges) -> tuple[str, ...]:
     """Return the springs that the problem may choose; the others are prescribed."""
     return tuple(name for name, (low, high) in ranges.items() if low < high)
-
-
-def end_of(value: float, limits: tuple[float, float]) -> Literal["", "lower", "upper"]:
-    """Return the end of its range at which a number sits; "" inside, or where it has no choice."""
-    low, high = limits
-    margin = NEAR_END * (high - low)
-    if low == high:
-        return ""
-    if value >= high - margin:
-        return "upper"
-    return "lower" if value <= low + margin else ""
-
-
-def ends(values: Mapping[str, float], ranges: Ranges) -> dict[str, Literal["", "lower", "upper"]]:
-    """Return the free springs that sit at an end of their range, and at which.
-
-    Args:
-        values: Stiffness by spring [N m/rad]; other keys do no harm.
-        ranges: Range by spring.
-    """
-    found = {name: end_of(values[name], ranges[name]) for name in ranges if name in values}
-    return {name: end for name, end in found.items() if end}

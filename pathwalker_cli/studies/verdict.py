@@ -22,9 +22,9 @@ from pathwalker_cli.io.refusals import dotted
 from pathwalker_cli.model.elements.orthosis import AnkleOrthosis
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.patient.blocks import RealSpring
+from pathwalker_cli.results.text import end_of
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.studies.edges import Edge, find_edge
-from pathwalker_cli.studies.springs import end_of
 
 __all__ = [
     "SHARE",

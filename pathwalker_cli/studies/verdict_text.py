@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import STIFFNESSES, to_degrees
-from pathwalker_cli.results.orthosis_text import angle_words
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.results.text import angle_words
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.verdict import SHARE, NumberVerdict, StopVerdict, Verdict
 
 __all__ = [
@@ -176,7 +176,7 @@ def snapped_warning(verdict: Verdict) -> str:
 def _snapped(verdict: Verdict) -> str:
     snapped = verdict.snapped
     if snapped is None:
-        return "the patient's file lists none (orthosis.names)"
+        return "the patient's file lists none (orthosis.springs)"
     chosen = ", ".join(
         f"{measure_of(name).label} {snapped.names[name]} ({stiffness:.1f} N m/rad, "
         f"{per_degree(stiffness):.2f} N m/deg)"

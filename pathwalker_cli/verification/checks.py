@@ -18,12 +18,13 @@ from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.results.metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.results.run_folder import CONFIG, PATIENT, Run, load_run
-from pathwalker_cli.results.run_metrics import METRICS_HASH, metrics_hash, sha256
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.stride.balance import balance
-from pathwalker_cli.stride.metrics import GaitMetrics, gait_metrics
+from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import GaitSeries, gait_series
+from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.stride.verify import equation_residual, reintegrate, second_engine_residual
 
 __all__ = ["Check", "Verification", "verify_run"]
@@ -110,7 +111,7 @@ def verify_run(folder: str | Path) -> Verification:
     run = load_run(folder)
     solver = GaitSolver(run.case)
     series = gait_series(solver.walker, run.motion)
-    numbers = gait_metrics(series)
+    numbers = metrics_of(stride_of(series))
     checks = (
         *_files(run, series),
         *_numbers(run, solver, numbers),
@@ -178,10 +179,10 @@ def _largest(name: str, differences: Iterable[tuple[str, float]]) -> Check:
     return Check(name, worst, _SAME, "relative", f"in {place}" if worst else "")
 
 
-def _numbers(run: Run, solver: GaitSolver, numbers: GaitMetrics) -> Iterator[Check]:
+def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[Check]:
     """Yield whether metrics.json says what follows from the motion."""
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
-    made: dict[str, Any] = numbers.as_dict()
+    made = dict(numbers)
     if run.config.transcription == "collocation":
         terms = cost_terms(run.motion, solver.gait.costs, solver.weights, solver.samples)
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
@@ -224,7 +225,7 @@ def _apart(one: Any, two: Any) -> float:
     return 0.0 if one == two else math.inf
 
 
-def _dynamics(run: Run, series: GaitSeries, numbers: GaitMetrics) -> Iterator[Check]:
+def _dynamics(run: Run, series: GaitSeries, numbers: dict[str, Any]) -> Iterator[Check]:
     """Yield engines, integrator and conservation laws."""
     config = run.config
     if config.transcription != "collocation":
@@ -253,7 +254,7 @@ def _dynamics(run: Run, series: GaitSeries, numbers: GaitMetrics) -> Iterator[Ch
     )
     for name, share, limit in shares:
         yield Check(name, share if refined else None, limit, "share", note)
-    pull = max(0.0, -numbers.min_vertical_force)
+    pull = max(0.0, -numbers["min_vertical_force"])
     yield Check("ground pulls", pull, _EQUATIONS, "N")
 
 

@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SUFFIX, Side
-from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
+from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side
 from pathwalker_cli.stride.figures.curves import Reference
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -24,6 +23,7 @@ from pathwalker_cli.stride.figures.style import (
     toe_off_line,
 )
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import own_cycle
 
 __all__ = ["activations"]
 
@@ -39,7 +39,7 @@ def activations(series: GaitSeries, reference: Reference | None = None) -> Figur
     """
     fig = new_figure(4.6)
     grid = fig.subplots(4, 4, sharex=True, sharey=True)
-    columns = tuple(product(BOTH_SIDES, _DIRECTIONS))
+    columns = tuple(product(SIDES, _DIRECTIONS))
     for row, joint in zip(grid, LEG_JOINTS, strict=False):
         for ax, (side, direction) in zip(row, columns, strict=True):
             name = f"{joint}_{direction}_{SUFFIX[side]}"

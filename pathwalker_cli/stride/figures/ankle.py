@@ -9,12 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pathwalker_cli.conventions import COORDINATES, SUFFIX, Side, to_degrees
+from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side, to_degrees
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.elements.orthosis import OrthosisSide, orthosis_torque
-from pathwalker_cli.stride.ankle_profile import ankle_torque_line
-from pathwalker_cli.stride.cycle import BOTH_SIDES
-from pathwalker_cli.stride.feet import toe_bearing
 from pathwalker_cli.stride.figures.curves import Reference
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -25,7 +22,9 @@ from pathwalker_cli.stride.figures.style import (
     new_figure,
     zero_line,
 )
+from pathwalker_cli.stride.measures import ankle_torque_line
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import stride_of, toe_bearing
 
 __all__ = ["ankle_torque", "orthosis_curves"]
 
@@ -49,7 +48,7 @@ def orthosis_curves(series: GaitSeries, reference: Reference | None = None) -> F
         raise InputError("a barefoot walker has no orthosis curve", allowed="condition orthosis")
     fig = new_figure(2.4)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
-    for i, (ax, side) in enumerate(zip(panels, BOTH_SIDES, strict=True)):
+    for i, (ax, side) in enumerate(zip(panels, SIDES, strict=True)):
         _draw_orthosis(ax, series, side, series.walker.orthosis[i])
         dress(ax, _title(series, side), _ANGLE, _TORQUE if i == 0 else "")
     legend(
@@ -65,7 +64,7 @@ def orthosis_curves(series: GaitSeries, reference: Reference | None = None) -> F
 
 def _draw_orthosis(ax: Axes, series: GaitSeries, side: Side, orthosis: OrthosisSide) -> None:
     """Draw curve, walked part, stops and stiffness of one orthosis."""
-    i, colour = BOTH_SIDES.index(side), LINE_COLOUR[side]
+    i, colour = SIDES.index(side), LINE_COLOUR[side]
     k_d, k_p = float(series.stiffness[i]), float(series.stiffness[i + 2])
     angle = series.column(f"ankle_{SUFFIX[side]}")
     stops = (orthosis.dorsiflexion_stop, orthosis.plantarflexion_stop)
@@ -84,7 +83,7 @@ def _draw_orthosis(ax: Axes, series: GaitSeries, side: Side, orthosis: OrthosisS
 
 def _title(series: GaitSeries, side: Side) -> str:
     """Return the side with its stiffnesses in both units."""
-    i = BOTH_SIDES.index(side)
+    i = SIDES.index(side)
     k_d, k_p = (float(series.stiffness[row]) for row in (i, i + 2))
     return (
         f"{side.capitalize()} orthosis\nK_D {k_d:.1f}, K_P {k_p:.1f} N m/rad\n"
@@ -104,7 +103,7 @@ def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figu
     """
     fig = new_figure(2.4)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
-    for i, (ax, side) in enumerate(zip(panels, BOTH_SIDES, strict=True)):
+    for i, (ax, side) in enumerate(zip(panels, SIDES, strict=True)):
         _draw_profile(ax, series, side)
         dress(ax, f"{side.capitalize()} ankle", _ANGLE, _TORQUE if i == 0 else "")
     legend(
@@ -123,7 +122,10 @@ def _draw_profile(ax: Axes, series: GaitSeries, side: Side) -> None:
     name = f"ankle_{SUFFIX[side]}"
     angle = -series.column(name)
     torque = series.net_torque[:, COORDINATES.index(name)]
-    bearing, (slope, offset) = toe_bearing(series, side), ankle_torque_line(series, side)
+    bearing, (slope, offset) = (
+        toe_bearing(series.phase, side),
+        ankle_torque_line(stride_of(series), side),
+    )
     look: dict[str, Any] = {"color": LINE_COLOUR[side], "linestyle": LINE_STYLE[side]}
     zero_line(ax)
     ax.plot(to_degrees(angle), torque, linewidth=0.6, **look)

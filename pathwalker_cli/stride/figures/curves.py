@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 from matplotlib.axes import Axes
 
-from pathwalker_cli.conventions import Side
-from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
+from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.stride.figures.style import LINE_COLOUR, LINE_STYLE, toe_off_line
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import own_cycle
 
 __all__ = ["CLINICAL_ANGLE", "EXTENSION", "Band", "Reference", "draw_band", "draw_sides"]
 
@@ -95,7 +95,7 @@ def draw_sides(ax: Axes, series: GaitSeries, values: Mapping[Side, np.ndarray]) 
         series: The stride.
         values: Per side, shape (n,), in the unit of the panel.
     """
-    for side in BOTH_SIDES:
+    for side in SIDES:
         cycle = own_cycle(series, side)
         curve = values[side][cycle.index]
         ax.plot(cycle.percent, curve, color=LINE_COLOUR[side], linestyle=LINE_STYLE[side])

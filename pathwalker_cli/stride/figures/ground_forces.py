@@ -6,8 +6,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from pathwalker_cli.conventions import SUFFIX
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.conventions import SIDES, SUFFIX
 from pathwalker_cli.stride.figures.curves import Reference, draw_band, draw_sides
 from pathwalker_cli.stride.figures.style import (
     band_handle,
@@ -39,12 +38,12 @@ def ground_forces(series: GaitSeries, reference: Reference | None = None) -> Fig
     bands, factor = reference.forces if reference else {}, 100.0 / series.walker.weight
     fig = new_figure(2.1)
     for ax, (axis, (title, label)) in zip(fig.subplots(1, 2), _PANELS.items(), strict=True):
-        for side in BOTH_SIDES:
+        for side in SIDES:
             draw_band(ax, bands.get(f"foot_{SUFFIX[side]}_{axis}"), side, factor)
         force = series.vertical_force if axis == "z" else series.forward_force
         dress(ax, title, y=label)
         zero_line(ax)
-        draw_sides(ax, series, {side: factor * force(side) for side in BOTH_SIDES})
+        draw_sides(ax, series, {side: factor * force(side) for side in SIDES})
         percent_axis(ax)
     legend(fig, [*side_handles(), events_handle(), *([band_handle()] if bands else [])])
     return fig

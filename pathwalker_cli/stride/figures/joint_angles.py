@@ -6,8 +6,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from pathwalker_cli.conventions import SUFFIX, to_degrees
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.conventions import SIDES, SUFFIX, to_degrees
 from pathwalker_cli.stride.figures.curves import (
     CLINICAL_ANGLE,
     Reference,
@@ -51,7 +50,7 @@ def joint_angles(series: GaitSeries, reference: Reference | None = None) -> Figu
     panels = fig.subplots(3, 2).ravel()
     for ax, (joint, (title, label)) in zip(panels, _PANELS.items(), strict=False):
         sign, values = CLINICAL_ANGLE.get(joint, 1.0), {}
-        for side in BOTH_SIDES:
+        for side in SIDES:
             name = f"{joint}_{SUFFIX[side]}"
             draw_band(ax, bands.get(name), side, sign * float(to_degrees(1.0)))
             column = name if joint in CLINICAL_ANGLE else joint

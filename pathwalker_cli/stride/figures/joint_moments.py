@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pathwalker_cli.conventions import COORDINATES, SUFFIX
-from pathwalker_cli.stride.cycle import BOTH_SIDES, own_cycle
+from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX
 from pathwalker_cli.stride.figures.curves import EXTENSION, Reference, draw_band, draw_sides
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -25,6 +24,7 @@ from pathwalker_cli.stride.figures.style import (
     zero_line,
 )
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import own_cycle
 
 __all__ = ["joint_moments"]
 
@@ -50,7 +50,7 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
     panels = fig.subplots(2, 2).ravel()
     for ax, (joint, title) in zip(panels, _TITLES.items(), strict=False):
         factor, values = EXTENSION[joint] / mass, {}
-        for side in BOTH_SIDES:
+        for side in SIDES:
             name = f"{joint}_{SUFFIX[side]}"
             draw_band(ax, bands.get(name), side, factor)
             values[side] = factor * series.net_torque[:, COORDINATES.index(name)]
@@ -69,7 +69,7 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
 
 def _draw_orthosis(ax: Axes, series: GaitSeries, factor: float) -> None:
     """Draw the torques of the orthoses as thin lines."""
-    for i, side in enumerate(BOTH_SIDES):
+    for i, side in enumerate(SIDES):
         cycle, torque = own_cycle(series, side), factor * series.orthosis_torque[:, i]
         colour, style = LINE_COLOUR[side], LINE_STYLE[side]
         ax.plot(cycle.percent, torque[cycle.index], color=colour, linestyle=style, linewidth=0.7)

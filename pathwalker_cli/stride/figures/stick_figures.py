@@ -10,10 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
-from pathwalker_cli.conventions import SUFFIX, Side
-from pathwalker_cli.stride.body import body_points
-from pathwalker_cli.stride.cycle import BOTH_SIDES, foot_strike_time
-from pathwalker_cli.stride.feet import centre_of_pressure, loaded
+from pathwalker_cli.conventions import SIDES, SUFFIX, Side
 from pathwalker_cli.stride.figures.curves import Reference
 from pathwalker_cli.stride.figures.style import (
     BODY_COLOUR,
@@ -25,6 +22,7 @@ from pathwalker_cli.stride.figures.style import (
     new_figure,
 )
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import body_points, centre_of_pressure, loaded, stride_of
 
 __all__ = ["stick_figures"]
 
@@ -51,7 +49,7 @@ def stick_figures(series: GaitSeries, reference: Reference | None = None) -> Fig
     legend(
         fig,
         [
-            *(Line2D([], [], label=f"{s} leg", **_LEG_LOOK[s]) for s in BOTH_SIDES),
+            *(Line2D([], [], label=f"{s} leg", **_LEG_LOOK[s]) for s in SIDES),
             Line2D(
                 [],
                 [],
@@ -82,14 +80,14 @@ def _draw_row(ax: Axes, series: GaitSeries, row: tuple[int, ...]) -> None:
 
 def _draw_instant(ax: Axes, series: GaitSeries, percent: float, slot: float, height: float) -> None:
     """Draw the walker at one position of the right gait cycle with its pelvis above `slot`."""
-    start = foot_strike_time(series, "right")
+    start = stride_of(series).strike("right")
     time = (start + percent / 100.0 * series.duration) % series.duration
     q = np.array([np.interp(time, series.time, column) for column in series.q.T])
     shift = np.array([slot - q[0], 0.0])
     _draw_body(ax, {n: p + shift for n, p in body_points(series.walker, q).items()})
     row = int(np.argmin(np.abs(series.time - time)))
     scale = FORCE_LENGTH * height / series.walker.weight
-    for side in BOTH_SIDES:
+    for side in SIDES:
         if loaded(series, side)[row]:
             x = centre_of_pressure(series, side)[row] - series.q[row, 0] + slot
             force = (series.forward_force(side)[row], series.vertical_force(side)[row])
@@ -98,7 +96,7 @@ def _draw_instant(ax: Axes, series: GaitSeries, percent: float, slot: float, hei
 
 def _draw_body(ax: Axes, points: dict[str, np.ndarray]) -> None:
     """Draw legs, feet, pelvis, trunk and head."""
-    for side in BOTH_SIDES:
+    for side in SIDES:
         s, look = SUFFIX[side], _LEG_LOOK[side]
         _draw_chain(ax, points, ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}"), look)
         foot = (f"ankle_{s}", f"heel_{s}", f"toe_{s}", f"ankle_{s}")

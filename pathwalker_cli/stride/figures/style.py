@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.conventions import Side
-from pathwalker_cli.stride.cycle import BOTH_SIDES, OwnCycle
+from pathwalker_cli.conventions import SIDES, Side
+from pathwalker_cli.stride.stride import OwnCycle
 
 __all__ = [
     "BODY_COLOUR",
@@ -115,9 +115,7 @@ def zero_line(ax: Axes) -> None:
 
 def side_handles() -> list[Artist]:
     """Return the legend entries of the two sides."""
-    return [
-        Line2D([], [], color=LINE_COLOUR[s], linestyle=LINE_STYLE[s], label=s) for s in BOTH_SIDES
-    ]
+    return [Line2D([], [], color=LINE_COLOUR[s], linestyle=LINE_STYLE[s], label=s) for s in SIDES]
 
 
 def events_handle() -> Artist:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.results.tables import DIGITS
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.units import unit_of
 
@@ -17,21 +17,6 @@ __all__ = ["CONVERGED", "PENDING", "CaseTable", "numbers_of", "read_metrics"]
 CONVERGED: Final = "converged"
 PENDING: Final = "not yet run"
 """Status of a case whose turn has not come."""
-
-_PER_SIDE: Final = {
-    "step_length": "m",
-    "min_stance_knee_flexion": "rad",
-    "dorsiflexion_stiffness": "N m/rad",
-    "plantarflexion_stiffness": "N m/rad",
-}
-
-_GAIT: Final = {
-    "cost": "",
-    "walking_speed": "m/s",
-    **{f"{stem}_{side}": unit for stem, unit in _PER_SIDE.items() for side in SIDES},
-    "effort_per_distance": "s/m",
-}
-"""Metrics of a converged case and their units: a last iterate is no gait."""
 
 _PROOF: Final = {
     "largest_violation": "",
@@ -55,7 +40,8 @@ class CaseTable:
         varied = {key: unit_of(key) for case in cases[:1] for key in case.values}
         columns = {"case": "", "patient": "", "problem": "", **varied}
         columns |= {"variant": ""} if self._named else {}
-        columns |= {"status": "", **_GAIT, **_PROOF}
+        gait = {m.key: "" if m.unit == "1" else m.unit for m in measures_in("batch")}
+        columns |= {"status": "", **gait, **_PROOF}
         self.header = [f"{name} [{unit}]" if unit else name for name, unit in columns.items()]
 
     def row(
@@ -81,8 +67,8 @@ def numbers_of(status: str, metrics: Mapping[str, Any] | None) -> dict[str, str]
         metrics: Content of the run's `metrics.json`; None if there is no run.
     """
     found = metrics or {}
-    gait = found if status == CONVERGED else {}
-    numbers = {name: gait.get(name) for name in _GAIT}
+    gait = found if status == CONVERGED else {}  # a last iterate is no gait
+    numbers = {m.key: gait.get(m.key) for m in measures_in("batch")}
     numbers |= {name: found.get(name) for name in _PROOF}
     return {name: _number(value) for name, value in numbers.items()}
 

@@ -21,8 +21,8 @@ from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.patient.blocks import SpringSet
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import STYLE, legend, legend_panel, new_figure
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.landscape.result import Landscape
-from pathwalker_cli.studies.measures import measure_of
 
 __all__ = ["Chosen", "cost_figure", "landscape_figure", "save_landscape_figure"]
 
@@ -161,7 +161,7 @@ def _article(landscape: Landscape) -> dict[str, tuple[float, float]]:
 def _draw_measure(fig: Figure, ax: Axes, landscape: Landscape, key: str) -> None:
     """Draw one measure of the best local optima over the plane."""
     measure = measure_of(key)
-    values = np.ma.masked_invalid(np.vectorize(measure.shown)(landscape.values(key)).T)
+    values = np.ma.masked_invalid(np.vectorize(measure.in_shown_unit)(landscape.values(key)).T)
     if np.ptp(values.compressed()) <= _FLAT * abs(values.mean()):
         ax.set_facecolor("#eeeeee")
         ax.text(0.5, 0.5, f"{values.mean():.3g} {measure.shown_unit}\neverywhere", ha="center",

@@ -10,9 +10,9 @@ import numpy as np
 
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.landscape.figures import save_landscape_figure
 from pathwalker_cli.studies.landscape.result import Landscape, Point, Region
-from pathwalker_cli.studies.measures import MEASURES
 
 __all__ = ["ENTRIES", "landscape_content", "write_landscape"]
 
@@ -21,18 +21,20 @@ _TABLE, _SUMMARY = "landscape.csv", "landscape.json"
 ENTRIES: Final = frozenset({"base", "points", "figures", _TABLE, _SUMMARY})
 """Everything that the folder of a landscape holds."""
 
-_HEADER: Final = (
-    "point",
-    "dorsiflexion_stiffness [N m/rad]",
-    "plantarflexion_stiffness [N m/rad]",
-    "branch",
-    "status",
-    "cost_increase [1]",
-    *(measure.column for measure in MEASURES),
-    "solves",
-    "iterations",
-    "seconds",
-)
+
+def _header() -> tuple[str, ...]:
+    return (
+        "point",
+        "dorsiflexion_stiffness [N m/rad]",
+        "plantarflexion_stiffness [N m/rad]",
+        "branch",
+        "status",
+        "cost_increase [1]",
+        *(measure.column for measure in measures_in("studies")),
+        "solves",
+        "iterations",
+        "seconds",
+    )  # fmt: skip
 
 
 def write_landscape(folder: Path, landscape: Landscape) -> None:
@@ -43,7 +45,7 @@ def write_landscape(folder: Path, landscape: Landscape) -> None:
         landscape: The landscape.
     """
     (folder / "figures").mkdir(parents=True, exist_ok=True)
-    write_table(folder / _TABLE, _HEADER, _rows(landscape))
+    write_table(folder / _TABLE, _header(), _rows(landscape))
     write_json(folder / _SUMMARY, landscape_content(landscape))
     save_landscape_figure(folder / "figures", landscape)
 
@@ -54,7 +56,7 @@ def _rows(landscape: Landscape) -> Iterator[list[Any]]:
     for point in landscape.points:
         solved = np.isfinite(point.cost)
         more = (point.cost - least) / abs(least) if solved else None
-        numbers = [point.measures.get(measure.key) for measure in MEASURES]
+        numbers = [point.measures.get(measure.key) for measure in measures_in("studies")]
         yield [
             point.name, point.k_d, point.k_p, point.branch, point.status, more, *numbers,
             point.times, point.iterations, point.seconds,

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -23,7 +23,8 @@ from pathwalker_cli.stride.figures.style import (
     legend,
     new_figure,
 )
-from pathwalker_cli.studies.measures import COMPARED, measure_of
+from pathwalker_cli.stride.measures import measure_of
+from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
 from pathwalker_cli.studies.perturbation.text import paper_changes
 
@@ -68,7 +69,7 @@ def _draw(ax: Axes, result: Perturbation, key: str) -> None:
     ax.axvline(0.0, color=NEUTRAL, linewidth=0.6)
     shown = [0.0]
     for y, row in enumerate(result.rows):
-        side = next(side for side in BOTH_SIDES if row.spring.endswith(side))
+        side = next(side for side in SIDES if row.spring.endswith(side))
         if key in row.changes:
             x = 100.0 * row.changes[key]
             ax.plot([0.0, x], [y, y], color=LINE_COLOUR[side], linewidth=1.4, solid_capstyle="butt")
@@ -89,7 +90,7 @@ def _handles(result: Perturbation) -> list[Artist]:
     handles: list[Artist] = [
         Line2D([], [], color=LINE_COLOUR[side], marker=MARKER[side], markersize=4.5,
                label=f"{side} spring moved")
-        for side in reversed(BOTH_SIDES)
+        for side in reversed(SIDES)
     ]  # fmt: skip
     if any(paper_changes(result, row) for row in result.rows):
         handles.append(

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.studies.measures import measure_of
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.springs import Ranges
 
 __all__ = ["Perturbation", "Perturbed", "remark"]

@@ -19,11 +19,12 @@ from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.fields import Quantity, invalid
 from pathwalker_cli.results.run_folder import Run
+from pathwalker_cli.results.text import spring_ends
 from pathwalker_cli.studies.base import NeighbourStudy, require_optimum, resolver_of
 from pathwalker_cli.studies.journal import Journal
 from pathwalker_cli.studies.measures import measures
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed, remark
-from pathwalker_cli.studies.springs import Ranges, Spring, ends, free_springs, spring_ranges
+from pathwalker_cli.studies.springs import Ranges, Spring, free_springs, spring_ranges
 
 __all__ = ["PerturbationStudy", "moved_springs", "perturb"]
 
@@ -159,7 +160,7 @@ def _perturbed(
     changes = {key: value / before[key] - 1.0 for key, value in values.items()}
     change = changes.get("cost", 0.0)
     falls = change < -_NOISE * tolerance
-    end = ends(before, ranges).get(spring, "")
+    end = spring_ends(before, ranges).get(spring, "")
     note, explained = remark(end, moved[1], ranges[spring], change if falls else 0.0)
     return Perturbed(
         spring=spring,

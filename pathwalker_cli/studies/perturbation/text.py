@@ -9,9 +9,10 @@ from typing import Any, Final
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import COMPARED, MEASURES, measure_of
+from pathwalker_cli.results.text import spring_ends
+from pathwalker_cli.stride.measures import measure_of, measures_in
+from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
-from pathwalker_cli.studies.springs import ends
 
 __all__ = [
     "FILES",
@@ -49,7 +50,7 @@ def paper_changes(result: Perturbation, row: Perturbed) -> dict[str, float]:
 
 def write_perturbation(result: Perturbation, folder: Path) -> None:
     """Write `perturbation.csv` and `perturbation.json`."""
-    keys = [m.key for m in MEASURES if m.key in result.base]
+    keys = [m.key for m in measures_in("studies") if m.key in result.base]
     header = ["spring", "factor [1]", "stiffness [N m/rad]", "status"]
     header += [measure_of(key).column for key in keys]
     header += [f"change of {key} [%]" for key in keys]
@@ -86,7 +87,7 @@ def perturbation_content(result: Perturbation) -> dict[str, Any]:
         "seconds": result.seconds,
         "optimum": dict(result.base),
         "stiffness_ranges": {name: list(pair) for name, pair in result.ranges.items()},
-        "at_limit": ends(result.base, result.ranges),
+        "at_limit": spring_ends(result.base, result.ranges),
         "rows": [
             {
                 "spring": row.spring,

@@ -9,7 +9,8 @@ from typing import Any, Final
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import MEASURES, Measure, measure_of
+from pathwalker_cli.stride.measure import Measure
+from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.sensitivity.result import Check, Sensitivities, Sensitivity
 
 __all__ = [
@@ -106,7 +107,7 @@ def agreement(result: Sensitivities, check: Check) -> float:
 
 def sensitivity_lines(result: Sensitivities) -> Iterator[str]:
     """Yield the lines of the terminal: elasticities of what every study compares."""
-    shown = [m for m in MEASURES if m.key in result.base]
+    shown = [m for m in measures_in("studies") if m.key in result.base]
     yield "Elasticities at the optimum, % per %"
     yield f"{'one percent more of':<{_LABEL}}" + "".join(f"{m.short:>{_CELL}}" for m in shown)
     for row in result.rows:

@@ -10,7 +10,7 @@ import numpy as np
 
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import MEASURES
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.tradeoff.figures import save_tradeoff_figure
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
@@ -21,19 +21,21 @@ _TABLE, _SUMMARY = "tradeoff.csv", "tradeoff.json"
 ENTRIES: Final = frozenset({"base", "points", "runs", "figures", _TABLE, _SUMMARY})
 """Everything that the folder of a trade-off holds."""
 
-_HEADER: Final = (
-    "walking_speed_weight [s^2/m^2]",
-    "status",
-    "mesh",
-    "dominated",
-    *(measure.column for measure in MEASURES),
-    "reintegration_position_error [rad or m]",
-    "reintegration_velocity_error [rad/s or m/s]",
-    "intervals",
-    "cost_on_base_mesh [1]",
-    "local_optima",
-    "iterations",
-)
+
+def _header() -> tuple[str, ...]:
+    return (
+        "walking_speed_weight [s^2/m^2]",
+        "status",
+        "mesh",
+        "dominated",
+        *(measure.column for measure in measures_in("studies")),
+        "reintegration_position_error [rad or m]",
+        "reintegration_velocity_error [rad/s or m/s]",
+        "intervals",
+        "cost_on_base_mesh [1]",
+        "local_optima",
+        "iterations",
+    )  # fmt: skip
 
 
 def write_tradeoff(folder: Path, tradeoff: Tradeoff) -> None:
@@ -44,7 +46,7 @@ def write_tradeoff(folder: Path, tradeoff: Tradeoff) -> None:
         tradeoff: The trade-off.
     """
     (folder / "figures").mkdir(parents=True, exist_ok=True)
-    write_table(folder / _TABLE, _HEADER, _rows(tradeoff))
+    write_table(folder / _TABLE, _header(), _rows(tradeoff))
     write_json(folder / _SUMMARY, tradeoff_content(tradeoff))
     if tradeoff.solved:
         save_tradeoff_figure(folder / "figures", tradeoff)
@@ -139,10 +141,10 @@ def _value(number: float | None) -> float:
 def _rows(tradeoff: Tradeoff) -> Iterator[list[Any]]:
     """Yield one row for every weight; cells without a number stay empty."""
     for point in tradeoff.points:
-        numbers = [point.measures.get(measure.key) for measure in MEASURES]
+        numbers = [point.measures.get(measure.key) for measure in measures_in("studies")]
         dominated = "yes" if point.solved and tradeoff.dominated(point) else "no"
         if not point.solved:
-            empty = [None] * (len(_HEADER) - 2)
+            empty = [None] * (len(_header()) - 2)
             yield [point.weight, point.status, *empty]
             continue
         yield [

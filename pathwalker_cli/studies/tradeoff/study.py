@@ -18,10 +18,11 @@ from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.fields import AS_TUPLE, invalid
 from pathwalker_cli.results.run_folder import Run, load_run, write_run
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.base import NeighbourStudy
 from pathwalker_cli.studies.branches import explore
 from pathwalker_cli.studies.graph import Exploration, Graph, Rules, Values
-from pathwalker_cli.studies.measures import MEASURES, measures
+from pathwalker_cli.studies.measures import measures
 from pathwalker_cli.studies.neighbours import Neighbours, motion_signature
 from pathwalker_cli.studies.run import RunLog, done_run
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
@@ -182,7 +183,9 @@ class _Refined:
                    f"intervals, errors {errors[0]:.1e}, {errors[1]:.1e}")  # fmt: skip
         if not done:
             return checked.point(status=f"on a finer mesh: {metrics['status']}")
-        numbers = {m.key: metrics[m.key] for m in MEASURES if metrics.get(m.key) is not None}
+        numbers = {
+            m.key: metrics[m.key] for m in measures_in("studies") if metrics.get(m.key) is not None
+        }
         return checked.point(
             mesh_status="refined", measures=numbers, errors=errors, intervals=metrics["intervals"]
         )

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.stride.cycle import BOTH_SIDES
+from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -99,7 +99,7 @@ def _draw(ax: Axes, y: int, values: np.ndarray, spread: Spread, unit: float) -> 
         spread: The measure.
         unit: 100 for deviations in %, where the base is zero; 1 for the values themselves.
     """
-    side = next((side for side in BOTH_SIDES if side in spread.measure.key), None)
+    side = next((side for side in SIDES if side in spread.measure.key), None)
     colour, marker = (LINE_COLOUR[side], MARKER[side]) if side else (NEUTRAL, "^")
     heights = y + np.random.default_rng(_SEED).uniform(-_STRIP, _STRIP, len(values))
     ax.plot(values, heights, marker, color=colour, markersize=2.6, alpha=0.45, mew=0.0)
@@ -136,7 +136,7 @@ def _handles(count: int) -> list[Artist]:
     point: dict[str, Any] = {"color": NEUTRAL, "linewidth": 0}
     sides: list[Artist] = [
         Line2D([], [], color=LINE_COLOUR[s], marker=MARKER[s], linewidth=0, markersize=4.5, label=s)
-        for s in reversed(BOTH_SIDES)
+        for s in reversed(SIDES)
     ]
     return [
         *sides,

@@ -14,9 +14,11 @@ import numpy as np
 from scipy import stats
 
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.studies.measures import MEASURES, Measure
+from pathwalker_cli.results.text import spring_ends
+from pathwalker_cli.stride.measure import Measure
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.pool import Solved
-from pathwalker_cli.studies.springs import Ranges, ends
+from pathwalker_cli.studies.springs import Ranges
 from pathwalker_cli.studies.uncertainty.draws import Draws, Input
 
 __all__ = ["Spread", "Uncertainty", "chance_level", "rank_correlations", "spreads"]
@@ -67,13 +69,13 @@ class Uncertainty:
     @property
     def measures(self) -> tuple[Measure, ...]:
         """What is measured, in order."""
-        return tuple(m for m in MEASURES if m.key in self.base)
+        return tuple(m for m in measures_in("studies") if m.key in self.base)
 
     def values(self, key: str) -> np.ndarray:
         """Return a measure of all converged draws; at a limit, the limit itself, shape (n,)."""
         found = []
         for end in self.converged:
-            at = ends(end.values, self.ranges).get(key)
+            at = spring_ends(end.values, self.ranges).get(key)
             limit = None if at is None else self.ranges[key][at == "upper"]
             found.append(end.values[key] if limit is None else limit)
         return np.array(found)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.studies.measures import Measure
+from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.studies.pool import Solved
 from pathwalker_cli.studies.springs import free_springs
 from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
@@ -27,7 +27,7 @@ __all__ = [
 
 FILES: Final = ("draws.csv", "uncertainty.csv", "correlations.csv", "uncertainty.json")
 
-_DIGITS: Final = {"N m/rad": 1, "deg": 1, "m": 3, "m/s": 3, "s": 3, "s/m": 3, "1": 4}
+_DIGITS: Final = {"N m/rad": 1, "deg": 1, "m": 3, "m/s": 3, "s": 3, "s/m": 3, "": 4}
 """Digits after the point by unit shown."""
 
 _TOLD: Final = 5
@@ -141,7 +141,7 @@ def uncertainty_lines(result: Uncertainty) -> Iterator[str]:
 
 def _row(spread: Spread) -> str:
     measure = spread.measure
-    unit = "" if measure.unit == "1" else f" [{measure.shown_unit}]"
+    unit = f" [{measure.shown_unit}]" if measure.shown_unit else ""
     low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
     place, strength = _strongest(spread)
     told = "" if strength is None else f"{strength:+.2f}"
@@ -151,7 +151,7 @@ def _row(spread: Spread) -> str:
 
 def shown_text(measure: Measure, value: float) -> str:
     """Return a value of a measure in the unit for people."""
-    return f"{measure.shown(value):.{_DIGITS[measure.shown_unit]}f}"
+    return f"{measure.in_shown_unit(value):.{_DIGITS.get(measure.shown_unit, 3)}f}"
 
 
 def _line(label: str, base: str, middle: str, span: str, place: str, strength: str) -> str:

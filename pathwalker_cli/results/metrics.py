@@ -1,4 +1,4 @@
-"""The content of `metrics.json`: everything about a run that a script may want to know."""
+"""What `metrics.json` of a run holds: built from a solution, written, and read back as one type."""
 
 from __future__ import annotations
 
@@ -10,22 +10,25 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict
 
 from pathwalker_cli.case import Case, config_text
-from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.cost_terms import goal_values
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.json_file import json_text
 from pathwalker_cli.nlp.kernels import kernels_level
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.stride.balance import balance
-from pathwalker_cli.stride.metrics import gait_metrics
+from pathwalker_cli.stride.measures import metrics_of
+from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.versions import today, versions
 
 __all__ = [
     "METRICS_HASH",
     "RUN_FORMAT",
     "RunInputs",
+    "RunMetrics",
     "metrics_hash",
     "run_inputs",
     "run_metrics",
@@ -38,6 +41,75 @@ METRICS_HASH: Final = "metrics_hash"
 
 RUN_FORMAT: Final = 1
 """Number of the layout of a run folder; it grows when older ones can no longer be read."""
+
+Number = float | None
+"""A number; None for what JSON does not know."""
+
+
+class RunMetrics(BaseModel):
+    """Everything about a run that a script may want to know; SI units.
+
+    Besides these it has the measures of the gait, see `stride.measures`.  What runs of older
+    versions lack is None or empty.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    run_format: int
+    problem: str
+    status: str
+    condition: str
+    cost: Number
+    effort: Number
+    motion_hash: str = ""
+    multipliers_hash: str | None = None
+    patient: str | None = None
+    smoke: bool = False
+    cost_terms: dict[str, Number] = {}
+    goals: dict[str, Number] = {}
+    walking_speed: Number = None
+    largest_violation: Number = None
+    largest_violation_name: str | None = None
+    violations: list[dict[str, Any]] = []
+    reintegration_position_error: Number = None
+    reintegration_velocity_error: Number = None
+    second_engine_residual: Number = None
+    balance: dict[str, Number] = {}
+    shortfall: dict[str, Any] | None = None
+    active_bounds: list[str] | None = None
+    active: list[ActiveBound] | None = None
+    stiffness_ranges: dict[str, tuple[float, float]] = {}
+    unknowns: list[dict[str, Any]] = []
+    bound_sources: dict[str, str] | None = None
+    notes: list[str] | None = None
+    intervals: int | None = None
+    iterations: int | None = None
+    stages: list[dict[str, Any]] = []
+    local_optima: list[dict[str, Any]] = []
+    seconds_build: Number = None
+    seconds_solve: float = 0.0
+    seconds_verify: Number = None
+    start: str | None = None
+    warm_start: str | None = None
+    dynamics_backend: str | None = None
+    published_model: bool = False
+    date: str | None = None
+    versions: dict[str, str | None] = {}
+    kernels: str | None = None
+    input_hashes: dict[str, str | None] = {}
+    verdict: dict[str, Any] | None = None
+
+    def content(self) -> dict[str, Any]:
+        """Return what was set as plain values, with the hash of all of it."""
+        plain = self.model_dump(mode="json", exclude_unset=True)
+        return plain | {METRICS_HASH: metrics_hash(plain)}
+
+    @property
+    def bounds(self) -> tuple[ActiveBound, ...]:
+        """Bounds that hold the solution back; older runs have them as text only."""
+        if self.active is not None:
+            return tuple(self.active)
+        return tuple(filter(None, map(ActiveBound.parsed, self.active_bounds or ())))
 
 
 @dataclass(frozen=True)
@@ -77,8 +149,8 @@ def run_inputs(case: Case, warm_start: str | Path | None = None) -> RunInputs:
 
 def stiffness_ranges(solution: GaitSolution) -> dict[str, tuple[float, float]]:
     """Return the range of every free stiffness [N m/rad]; empty when barefoot."""
-    found = {name: solution.bounds.table.find(name) for name in STIFFNESSES}
-    return {name: pair for name, pair in found.items() if pair is not None}
+    ranges = {name: solution.bounds.table.find(name) for name in STIFFNESSES}
+    return {name: pair for name, pair in ranges.items() if pair is not None}
 
 
 def unknowns(solution: GaitSolution) -> list[dict[str, Any]]:
@@ -97,45 +169,52 @@ def unknowns(solution: GaitSolution) -> list[dict[str, Any]]:
     ]
 
 
-def run_metrics(solution: GaitSolution, inputs: RunInputs) -> dict[str, Any]:
-    """Return all metrics, ready for strict JSON: SI units, None for what is not a number."""
-    began = time.perf_counter()
-    residual = solution.second_engine
-    verify = solution.seconds["verify"] + time.perf_counter() - began
-    metrics = {
-        "run_format": RUN_FORMAT,
-        **_outcome(solution),
-        **gait_metrics(solution.last_iterate).as_dict(),
-        **_proof(solution, residual),
-        **_effort(solution),
-        "seconds_verify": verify,
-        **_origin(solution, solution.config, inputs),
-    }
-    return {key: _strict(value) for key, value in metrics.items()}
-
-
 def metrics_hash(metrics: Mapping[str, Any]) -> str:
     """Return the SHA-256 of all metrics but the one that holds it."""
     return sha256(json_text({k: v for k, v in metrics.items() if k != METRICS_HASH}).encode())
 
 
+def run_metrics(
+    solution: GaitSolution, inputs: RunInputs, more: Mapping[str, Any] | None = None
+) -> RunMetrics:
+    """Return all metrics of a solve.
+
+    Args:
+        solution: How it ended.
+        inputs: What it was made from.
+        more: Further entries, plain values.
+    """
+    began = time.perf_counter()
+    proof = _proof(solution)  # runs the second engine
+    verify = solution.seconds["verify"] + time.perf_counter() - began
+    values = {
+        **_outcome(solution),
+        **metrics_of(stride_of(solution.last_iterate)),
+        **proof,
+        **_origin(solution, inputs),
+        "seconds_verify": verify,
+        **(more or {}),
+    }
+    return RunMetrics.model_validate(_strict(values))
+
+
 def _outcome(solution: GaitSolution) -> dict[str, Any]:
     """Return what was asked for, how it ended and at which cost."""
+    config, walker = solution.config, solution.walker
     return {
-        "problem": solution.config.problem,
+        "run_format": RUN_FORMAT,
+        "problem": config.problem,
         "status": solution.status,
-        "patient": solution.walker.patient.id,
-        "condition": solution.walker.condition,
-        "smoke": solution.config.smoke,
+        "patient": walker.patient.id,
+        "condition": walker.condition,
+        "smoke": config.smoke,
         "cost": solution.cost,
         "cost_terms": solution.cost_terms,
-        "goals": goal_values(
-            solution.last_motion, solution.walker.weight, solution.config.cost.comfort_ranges
-        ),
+        "goals": goal_values(solution.last_motion, walker.weight, config.cost.comfort_ranges),
     }
 
 
-def _proof(solution: GaitSolution, residual: float) -> dict[str, Any]:
+def _proof(solution: GaitSolution) -> dict[str, Any]:
     """Return what speaks for the result, and what held it back."""
     errors, worst = solution.reintegration, solution.violations[0]
     return {
@@ -144,10 +223,11 @@ def _proof(solution: GaitSolution, residual: float) -> dict[str, Any]:
         "violations": [asdict(violation) for violation in solution.violations],
         "reintegration_position_error": errors.worst_position,
         "reintegration_velocity_error": errors.worst_velocity,
-        "second_engine_residual": residual,
+        "second_engine_residual": solution.second_engine,
         "balance": asdict(balance(solution.last_iterate)),
         "shortfall": None if solution.shortfall is None else solution.shortfall.as_dict(),
         "active_bounds": [str(bound) for bound in solution.active],
+        "active": [asdict(bound) for bound in solution.active],
         "stiffness_ranges": stiffness_ranges(solution),
         "unknowns": unknowns(solution),
         "bound_sources": solution.bounds.sources,
@@ -155,25 +235,18 @@ def _proof(solution: GaitSolution, residual: float) -> dict[str, Any]:
     }
 
 
-def _effort(solution: GaitSolution) -> dict[str, Any]:
-    """Return mesh, iterations and times."""
+def _origin(solution: GaitSolution, inputs: RunInputs) -> dict[str, Any]:
+    """Return mesh, iterations, times, and where the run comes from."""
     return {
         "intervals": solution.last_motion.intervals,
         "iterations": solution.iterations,
         "stages": [asdict(stage) for stage in solution.stages],
         "local_optima": [asdict(optimum) for optimum in solution.optima],
-        "seconds_build": solution.seconds["build"],
-        "seconds_solve": solution.seconds["solve"],
-    }
-
-
-def _origin(solution: GaitSolution, config: StudyConfig, inputs: RunInputs) -> dict[str, Any]:
-    """Return where the run comes from."""
-    return {
+        **{f"seconds_{part}": solution.seconds[part] for part in ("build", "solve")},
         "start": solution.start,
         "warm_start": inputs.warm_start or None,
         "dynamics_backend": solution.walker.backend,
-        "published_model": config.model.published,
+        "published_model": solution.config.model.published,
         "date": today(),
         "versions": versions(),
         "kernels": kernels_level() or "none",
