@@ -11,7 +11,7 @@ from typing import Any
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open
 
-__all__ = ["number", "read_cells", "read_rows", "write_table"]
+__all__ = ["as_text", "number", "read_cells", "read_rows", "write_table"]
 
 
 def write_table(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
@@ -21,6 +21,11 @@ def write_table(path: str | Path, header: Sequence[str], rows: Iterable[Sequence
         writer.writerow(header)
         for row in rows:
             writer.writerow([f"{v:.9g}" if isinstance(v, float) else v for v in row])
+
+
+def as_text(value: float | None, digits: int = 6) -> str:
+    """Return a number with that many significant digits, "" for None and NaN."""
+    return "" if value is None or math.isnan(value) else f"{value:.{digits}g}"
 
 
 def read_cells(path: Path, mend: str = "", encoding: str = "utf-8") -> list[list[str]]:
