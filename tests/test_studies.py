@@ -69,7 +69,8 @@ def free(*addresses: str) -> str:
           for name in STUDIES),
         *((name, HALF, "is solved as half a cycle, in which the numbers of one side")
           for name in ("perturb", "uncertainty", "landscape")),
-        ("sensitivity", ("base=mapd-healthy", "check=[]"), "half_cycle: asks for half a cycle, but strengths"),
+        ("sensitivity", ("base=mapd-healthy", "check=[]"),
+         "half_cycle: asks for half a cycle, but strengths"),
         ("sensitivity", ("places=[body_weight]",), "body_weight"),
         ("sensitivity", ("check=[body]",), "check: names body"),
         ("perturb", (PRESCRIBED,), "springs: there is nothing to move"),
