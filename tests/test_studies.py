@@ -21,10 +21,11 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.resolve import Resolver
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.studies import STUDIES, neighbours
+from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies.base import Plan, Work
 from pathwalker_cli.studies.landscape import LandscapeStudy, varied_springs
 from pathwalker_cli.studies.perturbation import PerturbationStudy, moved_numbers
+from pathwalker_cli.studies.registry import STUDIES
 
 BAREFOOT = ("base=mapd-barefoot",)
 FIT = ("base=ls-barefoot",)
@@ -68,7 +69,8 @@ def free(*addresses: str) -> str:
           for name in STUDIES),
         *((name, HALF, "is solved as half a cycle, in which the numbers of one side")
           for name in ("perturb", "uncertainty", "landscape")),
-        ("sensitivity", ("base=mapd-healthy", "check=[]"), "half_cycle: asks for half a"),
+        ("sensitivity", ("base=mapd-healthy", "check=[]"),
+         "half_cycle: asks for half a cycle, but strengths"),
         ("sensitivity", ("places=[body_weight]",), "body_weight"),
         ("sensitivity", ("check=[body]",), "check: names body"),
         ("perturb", (PRESCRIBED,), "springs: there is nothing to move"),
@@ -142,7 +144,7 @@ def test_tied_springs_have_a_landscape_of_both_sides() -> None:
 
 REGISTERED = """
 import sys
-from pathwalker_cli.studies import STUDIES, StudyEntry
+from pathwalker_cli.studies.registry import STUDIES, StudyEntry
 STUDIES["speeds"] = StudyEntry(
     "speeds", "Tell what speed costs.", "Tell what speeds cost, as CONFIG says.", "Speeds",
     "speeds_study",
