@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -34,19 +34,6 @@ from pathwalker_cli.patient.proportions import (
     TOE_SHARE,
     default_length,
 )
-
-__all__ = [
-    "ContactPoints",
-    "FootPoints",
-    "OrthosisData",
-    "Patient",
-    "Recorded",
-    "SegmentLengths",
-    "Strengths",
-    "load_patient",
-    "recordings_beside",
-    "shipped_patients",
-]
 
 JENSEN_AGES = Quantity(
     "years",
@@ -306,6 +293,26 @@ def load_patient(id_or_path: str | Path, recordings: tuple[Path, ...] = ()) -> P
     patient = validate(mapping, Patient, where=str(path), error=PatientError, lines=lines)
     patient._origin = _Origin(path, text.encode(), (path.parent / "recordings", *recordings))
     return patient
+
+
+@cache
+def healthy_child() -> Patient:
+    """Return the healthy child that strengths are compared with."""
+    return load_patient("sreenivasa2017-healthy")
+
+
+def healthy_strength(name: str, body_mass: float, height: float) -> float:
+    """Return a maximum isometric torque of a healthy child, the shipped one grown or shrunk [N m].
+
+    A torque is a force, which grows with body mass, times a lever, which grows with height.
+
+    Args:
+        name: Field of `Strengths`, e.g. "hip_extension".
+        body_mass: Body mass of the child [kg].
+        height: Height of the child [m].
+    """
+    child, same = healthy_child(), f"strengths.{name}.right"
+    return child.number(same) * (body_mass * height) / (child.body_mass * child.height)
 
 
 def recordings_beside(id_or_path: str | Path) -> Path:
