@@ -109,6 +109,12 @@ class CostConfig(YamlModel):
         return self
 
     @property
+    def weights(self) -> dict[str, float]:
+        """Weight of every cost term by its name."""
+        own = {key.removesuffix("_weight"): value for key, value in self if "_weight" in key}
+        return {**own, **self.goals}
+
+    @property
     def wanted(self) -> Costs:
         """The goals that have a weight, and what they need."""
         names = tuple(name for name in GOALS if self.goals.get(name, 0.0) > 0.0)

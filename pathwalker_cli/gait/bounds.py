@@ -11,6 +11,7 @@ import numpy as np
 from pathwalker_cli.config import BoundsConfig, StudyConfig
 from pathwalker_cli.conventions import ANGLES, GRAVITY, ROOT
 from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.gait.choices import TRACKING_ANGLES
 from pathwalker_cli.gait.problem import ACTIVATIONS, RESERVES, VELOCITIES
 from pathwalker_cli.io.fields import quantity_at
 from pathwalker_cli.model.contact import FORCES, PHASES, POINTS
@@ -100,7 +101,7 @@ def tracking_bounds(
         held: Value of every unknown of the walker by name [SI].
     """
     changes: dict[tuple[str, ...], Range] = {(name,): (-INFINITY, INFINITY) for name in RESERVES}
-    changes |= {(name,): (-2.5, 2.5) for name in ANGLES}
+    changes |= {(name,): TRACKING_ANGLES for name in ANGLES}
     changes[("walking_speed",)] = (-INFINITY, INFINITY)
     for phase, duration in zip(PHASES, durations, strict=True):
         changes[("duration", phase.name)] = (float(duration), float(duration))

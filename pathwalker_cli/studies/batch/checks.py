@@ -8,8 +8,7 @@ from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import ConfigError, InputError, PatientError, placed
 from pathwalker_cli.gait.bounds import gait_bounds
-from pathwalker_cli.gait.passage import recorded_passage
-from pathwalker_cli.gait.start import recorded_stride, start_recording
+from pathwalker_cli.gait.recorded import recorded_passage, recorded_stride, start_recording
 from pathwalker_cli.gait.symmetry import require_symmetry
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.results.run_folder import warm_start_run
