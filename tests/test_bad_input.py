@@ -18,7 +18,6 @@ import pytest
 from click.testing import CliRunner
 
 from broken import ANGLES, ARCHIVES, EVENTS, HTML, JSON, TABLES, YAML, angles, bomb
-from conftest import MadeSolution
 from helpers import called_apart
 from made_c3d import write_c3d
 from pathwalker_cli.checking.kinds import KINDS, check_orthosis
@@ -33,9 +32,8 @@ from pathwalker_cli.io.recordings import read_compact
 from pathwalker_cli.io.yaml_file import read_mapping, yaml_text
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.motion_file import read_motion, read_multipliers
-from pathwalker_cli.results.run_folder import load_run, write_run
+from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.batch.cases import load_cases
 
@@ -198,11 +196,9 @@ def test_broken_archives_are_refused(fault: str, tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def run(tmp_path: Path, made_solution: MadeSolution, monkeypatch: pytest.MonkeyPatch) -> Path:
+def run(made_runs: Path, tmp_path: Path) -> Path:
     """Return the folder of a converged run without figures."""
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
-    write_run(tmp_path / "run", made_solution())
-    return tmp_path / "run"
+    return Path(shutil.copytree(made_runs / "mapd-orthosis", tmp_path / "run"))
 
 
 @pytest.mark.parametrize("fault", JSON)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.plates import plate_load
+from pathwalker_cli.inverse.forces import plate_load
 from pathwalker_cli.io.c3d import analog_offset_error, read_c3d
 
 ezc3d = pytest.importorskip("ezc3d")

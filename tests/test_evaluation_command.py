@@ -39,23 +39,12 @@ def refusal(*words: object) -> str:
     return result.output
 
 
-@pytest.fixture(scope="module")
-def written(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a barefoot run and of one with orthoses."""
-    folder = tmp_path_factory.mktemp("written")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
-        for problem in ("mapd-barefoot", "mapd-orthosis"):
-            write_run(folder / problem, made_solution(problem))
-    return folder
-
-
 @pytest.fixture
-def runs(written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Path]:
+def runs(made_runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Path]:
     """Return the folders of both runs by problem, copies that may be changed; work beside them."""
     monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
     monkeypatch.chdir(tmp_path)
-    shutil.copytree(written, tmp_path / "made")
+    shutil.copytree(made_runs, tmp_path / "made")
     return {folder.name: folder for folder in (tmp_path / "made").iterdir()}
 
 

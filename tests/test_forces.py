@@ -12,11 +12,17 @@ import pytest
 
 from pathwalker_cli.conventions import COORDINATES, GRAVITY
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.direction import WalkingPlane
-from pathwalker_cli.inverse.filters import low_pass, smooth_rates
-from pathwalker_cli.inverse.forces import foot_extents, ground_forces
-from pathwalker_cli.inverse.plates import centre_of_pressure, plate_load, wrench_axis_at_ground
-from pathwalker_cli.inverse.process import process_trial
+from pathwalker_cli.inverse.dynamics import low_pass, smooth_rates
+from pathwalker_cli.inverse.forces import (
+    centre_of_pressure,
+    foot_extents,
+    ground_forces,
+    plate_load,
+)
+from pathwalker_cli.inverse.markers import WalkingPlane
+from pathwalker_cli.inverse.published import wrench_axis_at_ground
+from pathwalker_cli.inverse.study import RecordedConfig
+from pathwalker_cli.inverse.trials import c3d_trial
 from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import load_patient
@@ -139,13 +145,14 @@ def test_force_of_a_clean_stance() -> None:
     assert [item.reason for item in forces.stances] == [""]
     assert forces.plane.name == "+x"
     weight = GRAVITY * pin.computeTotalMass(model)
-    assert forces.force["right"][40:80, 1] == pytest.approx(weight, rel=0.01)
-    assert forces.force["right"][40:80, 0] == pytest.approx(0.1 * weight, rel=0.01)
-    assert forces.centre["right"][40:80] == pytest.approx(heel + 0.05, abs=1e-3)
-    assert forces.force["right"][95:108] == pytest.approx(0.0, abs=0.0), "in the air"
-    assert np.isnan(forces.force["right"][:20]).all(), "not measured"
-    assert forces.force["left"][40:80] == pytest.approx(0.0, abs=0.0)
-    assert np.isnan(forces.force["left"][95:]).all()
+    right, left = (forces.table.select((f"force_{s}_x", f"force_{s}_z")).values for s in ("r", "l"))
+    assert right[40:80, 1] == pytest.approx(weight, rel=0.01)
+    assert right[40:80, 0] == pytest.approx(0.1 * weight, rel=0.01)
+    assert forces.table["cop_r_x"][40:80] == pytest.approx(heel + 0.05, abs=1e-3)
+    assert right[95:108] == pytest.approx(0.0, abs=0.0), "in the air"
+    assert np.isnan(right[:20]).all(), "not measured"
+    assert left[40:80] == pytest.approx(0.0, abs=0.0)
+    assert np.isnan(left[95:]).all()
 
 
 @pytest.mark.parametrize(
@@ -162,7 +169,7 @@ def test_doubtful_stances_are_not_measured(made: dict[str, float], reason: str) 
     ahead = WalkingPlane(axis=0, sign=1)
     forces = ground_forces(recording(**made), model, motion, ahead)  # type: ignore[arg-type]
     assert reason in forces.stances[0].reason
-    assert np.isnan(forces.force["right"][40:80]).all()
+    assert np.isnan(forces.table.select(("force_r_x", "force_r_z")).values[40:80]).all()
 
 
 def two_steps(part: float = 0.0, standing_on: float = 1.0) -> Recording:
@@ -230,7 +237,7 @@ def test_a_foot_on_two_plates_spoils_both(made: dict[str, float], right: str, le
 
 def test_columns_of_the_table() -> None:
     model, motion, _ = standing()
-    table = ground_forces(recording(), model, motion).trajectory()
+    table = ground_forces(recording(), model, motion).table
     assert table.names == (
         "force_r_x", "force_r_z", "cop_r_x", "force_l_x", "force_l_z", "cop_l_x"
     )  # fmt: skip
@@ -261,8 +268,10 @@ def test_no_plates_is_an_error() -> None:
 def test_recorded_stances(trial: str, direction: str, measured: str) -> None:
     patient = load_patient("sreenivasa2017-patient")
     condition = "orthosis" if trial.startswith("orthosis") else "barefoot"
-    forces = process_trial(RECORDINGS / f"{trial}.c3d", patient, condition).forces
-    assert forces is not None
+    config = RecordedConfig(patient=patient.id)
+    walk, read = c3d_trial(RECORDINGS / f"{trial}.c3d", patient, condition, config)
+    forces = ground_forces(read, pinocchio_model(patient, condition), walk.motion)
     assert forces.plane.name == direction
-    found = [item for item in forces.stances if item.measured]
+    assert forces.stances == walk.stances
+    found = [item for item in walk.stances if item.measured]
     assert "".join(item.stance.side[0] for item in found) == measured

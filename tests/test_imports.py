@@ -59,7 +59,7 @@ CONFINED = {
     "matplotlib": (
         "animation.film",
         "stride.figures",
-        "inverse.recorded_figures",
+        "inverse.figures",
         "evaluation.curves",
         "evaluation.figures",
         "report.figures",

@@ -12,27 +12,31 @@ import pytest
 
 from pathwalker_cli.conventions import COORDINATES, GRAVITY, Condition
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.bands import cycle_band, resampled
-from pathwalker_cli.inverse.cycles import GaitCycle, Stance
+from pathwalker_cli.inverse.cycles import GaitCycle, Stance, cycle_band, resampled
 from pathwalker_cli.inverse.dynamics import inverse_dynamics
-from pathwalker_cli.inverse.evaluate import StudyTrial
-from pathwalker_cli.inverse.process import process_trial
-from pathwalker_cli.inverse.published import TURNED, forward_difference, published_torques
-from pathwalker_cli.inverse.published_tables import (
+from pathwalker_cli.inverse.forces import force_columns
+from pathwalker_cli.inverse.published import (
     AVERAGED_TRIALS,
-    PublishedTrial,
-    published_residuals,
-    published_strengths,
+    TURNED,
+    forward_difference,
+    published_torques,
 )
-from pathwalker_cli.inverse.residuals import residual_range, residuals
+from pathwalker_cli.inverse.residuals import (
+    ResidualRange,
+    residual_range,
+    residuals,
+    trial_residuals,
+)
 from pathwalker_cli.inverse.stance_checks import StanceForce
 from pathwalker_cli.inverse.strengths import (
     Peak,
+    extension_peaks,
     isometric_torque,
     stance_curves,
-    strengths,
     strengths_of,
 )
+from pathwalker_cli.inverse.study import InverseDynamicsConfig, RecordedConfig
+from pathwalker_cli.inverse.trials import Trial, c3d_trial, dynamics_trials, with_torques
 from pathwalker_cli.io.c3d import read_c3d
 from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.model.urdf import pinocchio_model
@@ -43,8 +47,8 @@ SHARED = Path(__file__).parents[2] / "shared"
 needs_shared = pytest.mark.skipif(
     not (SHARED / "published").is_dir(), reason="needs shared/published beside the checkout"
 )
-NOTHING = {"right": np.zeros((1, 2)), "left": np.zeros((1, 2))}
-NOWHERE = {"right": np.full(1, np.nan), "left": np.full(1, np.nan)}
+NOTHING = (0.0, 0.0, np.nan)
+"""No force forward and up [N], which acts nowhere [m]."""
 
 
 @cache
@@ -58,11 +62,16 @@ def states(count: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return tuple(np.random.default_rng(5).normal(size=(3, count, 10)) * 0.4)  # type: ignore[return-value]
 
 
+def loads(right: tuple[float, ...] = NOTHING, left: tuple[float, ...] = NOTHING) -> Trajectory:
+    """Return a table of ground forces in one frame: forward, up [N] and where they act [m]."""
+    return force_columns(np.zeros(1), {"right": np.array([right]), "left": np.array([left])})
+
+
 def test_free_fall_needs_no_force() -> None:
     q, v, _ = states()
     vdot = np.zeros((1, 10))
     vdot[0, 1] = -GRAVITY
-    tau = inverse_dynamics(walker(), q, 0.0 * v, vdot, NOTHING, NOWHERE)  # type: ignore[arg-type]
+    tau = inverse_dynamics(walker(), q, 0.0 * v, vdot, loads())
     assert tau == pytest.approx(0.0, abs=1e-9)
 
 
@@ -71,7 +80,7 @@ def test_inverse_of_forward_dynamics() -> None:
     q, v, _ = states()
     tau = np.random.default_rng(6).normal(size=10)
     vdot = pin.aba(model, model.createData(), q[0], v[0], tau)[None]
-    found = inverse_dynamics(model, q, v, vdot, NOTHING, NOWHERE)  # type: ignore[arg-type]
+    found = inverse_dynamics(model, q, v, vdot, loads())
     assert found[0] == pytest.approx(tau, abs=1e-9)
 
 
@@ -79,9 +88,8 @@ def test_force_acts_by_the_jacobian_of_its_point() -> None:
     model = walker()
     q, v, vdot = states()
     force, centre = np.array([30.0, 200.0]), 0.12
-    forces = NOTHING | {"left": force[None]}
-    bare = inverse_dynamics(model, q, v, vdot, NOTHING, NOWHERE)  # type: ignore[arg-type]
-    found = inverse_dynamics(model, q, v, vdot, forces, {**NOWHERE, "left": np.array([centre])})  # type: ignore[arg-type]
+    bare = inverse_dynamics(model, q, v, vdot, loads())
+    found = inverse_dynamics(model, q, v, vdot, loads(left=(*force, centre)))
     data = model.createData()
     pin.computeJointJacobians(model, data, q[0])
     foot = model.getJointId("ankle_l")
@@ -96,17 +104,16 @@ def test_weight_under_the_centre_of_mass_leaves_no_residual() -> None:
     data = model.createData()
     centre = pin.centerOfMass(model, data, q[0])[0]
     weight = GRAVITY * pin.computeTotalMass(model)
-    forces = NOTHING | {"right": np.array([[0.0, weight]])}
     still = np.zeros((1, 10))
-    tau = inverse_dynamics(model, q, still, still, forces, {**NOWHERE, "right": np.array([centre])})  # type: ignore[arg-type]
+    tau = inverse_dynamics(model, q, still, still, loads(right=(0.0, weight, centre)))
     assert tau[0, :3] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_unknown_force_leaves_the_other_leg_alone() -> None:
     model = walker()
     q, v, vdot = states()
-    forces = {"right": np.array([[5.0, 150.0]]), "left": np.full((1, 2), np.nan)}
-    tau = inverse_dynamics(model, q, v, vdot, forces, {**NOWHERE, "right": np.array([0.1])})  # type: ignore[arg-type]
+    forces = loads(right=(5.0, 150.0, 0.1), left=(np.nan, np.nan, np.nan))
+    tau = inverse_dynamics(model, q, v, vdot, forces)
     assert np.isnan(tau[0, [0, 1, 2, 6, 7, 8]]).all()
     assert np.isfinite(tau[0, [3, 4, 5, 9]]).all()
     found = residuals("trial", tau)
@@ -137,7 +144,7 @@ def test_flexion_and_trunk_follow_from_extension() -> None:
         "hip_extension_r": 18.63684, "hip_extension_l": 30.35641, "knee_extension_r": 22.39998,
         "knee_extension_l": 24.55091, "ankle_extension_r": 32.32569, "ankle_extension_l": 16.84245,
     }  # fmt: skip
-    peaks = tuple(Peak(name, 1.0, 0.0, 0.0, value, 1) for name, value in extension.items())
+    peaks = tuple(Peak(name, 1.0, 0.0, 0.0, value, (value,)) for name, value in extension.items())
     found = np.array(strengths_of(peaks).vector())
     published = load_patient("sreenivasa2017-patient").max_isometric_torque
     assert found == pytest.approx(np.array(published), abs=2e-5)
@@ -150,7 +157,7 @@ def test_cut_off_of_the_motion_reaches_the_stance_curves() -> None:
     fast = np.sin(2.0 * np.pi * 15.0 * time)[:, None]
     motion = Trajectory(time, COORDINATES, np.tile(fast, 10), ("m", "m", *["rad"] * 8))
     known = StanceForce(Stance("right", 60, 180), 0, "")
-    trial = StudyTrial("made", "barefoot", motion, (), (), tau=motion, stances=(known,))
+    trial = Trial("made", motion, (), None, "barefoot", (), tau=motion, stances=(known,))
     smooth, kept = (stance_curves([trial], cutoff)["hip_r"][0][:, 2] for cutoff in (4.0, 50.0))
     assert np.abs(smooth).max() < 0.5
     assert np.abs(kept).max() == pytest.approx(2.0 * np.pi * 15.0, rel=0.05)
@@ -200,26 +207,33 @@ def test_published_torques(file: Path) -> None:
     assert tau == pytest.approx(published, rel=1e-5, abs=1e-3)
 
 
-def published_trials(condition: Condition) -> tuple[PublishedTrial, ...]:
-    """Return the averaged trials; angles are the published ones where they are at hand."""
-    patient, found = load_patient("sreenivasa2017-patient"), []
-    for name in AVERAGED_TRIALS[condition]:
-        path = SHARED / "recordings" / condition / f"{name}.c3d"
-        q = process_trial(path, patient, condition).motion.values
-        recording = read_c3d(path)
-        tau, _ = published_torques(walker(condition, published=True), recording, q)
-        found.append(PublishedTrial(recording, q, tau))
-    return tuple(found)
+@cache
+def published_trials(condition: Condition) -> tuple[Trial, ...]:
+    """Return the averaged trials by the published method."""
+    folder = str(SHARED / "recordings" / condition)
+    config = InverseDynamicsConfig.model_validate(
+        {"study": "inverse-dynamics", "patient": "sreenivasa2017-patient", "method": "published",
+         "conditions": (condition,), "source": "c3d", "c3d": {condition: (folder,)}}
+    )  # fmt: skip
+    trials = dynamics_trials(config, load_patient(config.patient), lambda _: None)
+    assert tuple(trial.name for trial in trials) == AVERAGED_TRIALS[condition]
+    return trials
+
+
+def published_table(condition: Condition) -> ResidualRange:
+    """Return table 3 of the article, per body mass."""
+    own = [trial_residuals(trial, "whole cycle") for trial in published_trials(condition)]
+    return residual_range(own, per=24.7)
 
 
 @needs_shared
 def test_published_tables_barefoot() -> None:
-    trials = published_trials("barefoot")
-    table = published_residuals(trials, 24.7)
+    table = published_table("barefoot")
     assert table.mean == pytest.approx(np.array([-0.02, 1.36, -0.02]), abs=0.015)
     assert table.lowest == pytest.approx(np.array([-0.27, -0.04, -0.11]), abs=0.03)
     assert table.highest == pytest.approx(np.array([0.16, 2.80, 0.09]), abs=0.03)
-    found = {peak.generator: peak.strength for peak in published_strengths(trials)}
+    peaks = extension_peaks(stance_curves(published_trials("barefoot")), published=True)
+    found = {peak.generator: peak.strength for peak in peaks}
     expected = {"hip_extension_r": 18.64, "hip_extension_l": 30.36, "knee_extension_r": 22.40,
                 "knee_extension_l": 24.55}  # fmt: skip
     for generator, value in expected.items():
@@ -228,7 +242,7 @@ def test_published_tables_barefoot() -> None:
 
 @needs_shared
 def test_published_table_orthosis() -> None:
-    table = published_residuals(published_trials("orthosis"), 24.7)
+    table = published_table("orthosis")
     assert table.mean[[0, 2]] == pytest.approx(np.array([-0.05, -0.05]), abs=0.02)
     assert table.highest[[0, 2]] == pytest.approx(np.array([0.01, 0.11]), abs=0.02)
 
@@ -236,16 +250,18 @@ def test_published_table_orthosis() -> None:
 @needs_shared
 def test_own_residuals_and_strengths() -> None:
     patient = load_patient("sreenivasa2017-patient")
+    config = RecordedConfig(patient=patient.id)
     names = ("3053176", "3053178", "3053179", "3053183", "3053184")
+    paths = [SHARED / "recordings" / "barefoot" / f"{name}.c3d" for name in names]
     trials = [
-        process_trial(SHARED / "recordings" / "barefoot" / f"{name}.c3d", patient, "barefoot")
-        for name in names
+        with_torques(c3d_trial(path, patient, "barefoot", config)[0], patient) for path in paths
     ]
     found = [residuals(t.name, t.tau.values) for t in trials if t.tau is not None]
-    table = residual_range(tuple(found))
+    table = residual_range(found)
     assert np.abs(table.mean[[0, 2]]).max() < 3.0
     assert 0.0 < table.mean[1] < 25.0
-    assert strengths(trials).hip_extension.left == pytest.approx(30.36, rel=0.15)
+    strengths = strengths_of(extension_peaks(stance_curves(trials)))
+    assert strengths.hip_extension.left == pytest.approx(30.36, rel=0.15)
 
 
 def test_turned_trials_are_only_those_the_published_evaluation_knows() -> None:

@@ -11,10 +11,15 @@ import pytest
 
 from pathwalker_cli.conventions import COORDINATES, Condition
 from pathwalker_cli.errors import ConfigError, DataError
-from pathwalker_cli.inverse.direction import walking_plane
-from pathwalker_cli.inverse.gaps import Gap, bridge_gaps
 from pathwalker_cli.inverse.kinematics import _Fit, inverse_kinematics
-from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set, marker_points
+from pathwalker_cli.inverse.markers import (
+    Gap,
+    MarkerPoint,
+    bridge_gaps,
+    load_marker_set,
+    marker_points,
+    walking_plane,
+)
 from pathwalker_cli.io.c3d import Recording, read_c3d
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import load_patient

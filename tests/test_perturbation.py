@@ -24,7 +24,6 @@ from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.results import run_folder
-from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies.base import base_run, load_study, require_optimum
 from pathwalker_cli.studies.journal import Journal
 from pathwalker_cli.studies.measures import COMPARED
@@ -38,17 +37,6 @@ pytestmark = pytest.mark.usefixtures("sketched")
 MadeSolution = Callable[..., GaitSolution]
 
 
-@pytest.fixture(scope="module")
-def runs(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with a run with orthoses and a barefoot one."""
-    folder = tmp_path_factory.mktemp("runs")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
-        for problem in ("mapd-orthosis", "mapd-barefoot"):
-            write_run(folder / problem, made_solution(problem))
-    return folder
-
-
 @pytest.fixture
 def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
     """Let a stand-in solve all neighbours."""
@@ -59,11 +47,11 @@ def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
 
 
 @pytest.fixture
-def call(runs: Path, resolver: StandInResolver, tmp_path: Path) -> Callable[..., Result]:
+def call(made_runs: Path, resolver: StandInResolver, tmp_path: Path) -> Callable[..., Result]:
     """Return a function that runs the command on the run with orthoses."""
 
     def run(*words: object, problem: str = "mapd-orthosis", config: str = "perturbation") -> Result:
-        options = ["--run", runs / problem, "--out", tmp_path / "out", *words]
+        options = ["--run", made_runs / problem, "--out", tmp_path / "out", *words]
         return CliRunner().invoke(cli, ["perturb", config, *map(str, options)])
 
     return run
@@ -167,7 +155,7 @@ def test_numbers_beside_the_article_only_for_its_factor(call: Callable[..., Resu
 
 
 def test_further_factors_start_from_nearer_ones(
-    runs: Path, resolver: StandInResolver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    made_runs: Path, resolver: StandInResolver, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     starts = []
     solve = resolver.resolve
@@ -179,7 +167,7 @@ def test_further_factors_start_from_nearer_ones(
     study = PerturbationStudy(
         base="x", factors=(0.8, 1.2, 0.9), springs=("dorsiflexion_stiffness_left",)
     )
-    run = run_folder.load_run(runs / "mapd-orthosis")
+    run = run_folder.load_run(made_runs / "mapd-orthosis")
     result = perturb(study, run, tmp_path)
     held = [c.bounds.stiffness.get("dorsiflexion_stiffness_left") for c in starts]
     assert held == [None, None, (36.0, 36.0)]

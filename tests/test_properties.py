@@ -52,7 +52,7 @@ from pathwalker_cli.gait.cost_terms import cost_terms
 from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.symmetry import asymmetries, full_stride
-from pathwalker_cli.inverse.recorded_files import write_strengths_yaml
+from pathwalker_cli.inverse.files import write_strengths_yaml
 from pathwalker_cli.io.opensim import read_opensim, write_opensim
 from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.io.yaml_file import yaml_text

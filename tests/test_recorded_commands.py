@@ -17,11 +17,12 @@ from click.testing import CliRunner, Result
 from made_c3d import cut, folder, motion, text, write_c3d
 from pathwalker_cli.commands.recorded import id_command, ik_command, import_command
 from pathwalker_cli.errors import ConfigError, DataError, InputError
-from pathwalker_cli.inverse.evaluate import dynamics_trials
-from pathwalker_cli.inverse.recorded_figures import joint_torque_figure, save_recorded_figures
-from pathwalker_cli.inverse.recorded_files import staged_folder
+from pathwalker_cli.inverse.figures import joint_torque_figure, save_recorded_figures
+from pathwalker_cli.inverse.residuals import residual_tables, study_warnings
+from pathwalker_cli.inverse.strengths import strength_table
 from pathwalker_cli.inverse.study import load_inverse_dynamics, load_inverse_kinematics
-from pathwalker_cli.inverse.study_tables import residual_tables, strength_table, study_warnings
+from pathwalker_cli.inverse.trials import dynamics_trials
+from pathwalker_cli.io.atomic import staged_folder
 from pathwalker_cli.io.opensim import read_opensim, write_opensim
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.trajectory_csv import read_trajectory

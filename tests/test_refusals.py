@@ -6,9 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from helpers import called_apart
 from made_c3d import cut, text, write_c3d
+from pathwalker_cli.cli import cli
 from pathwalker_cli.paths import shipped
 
 C3D = "walk.c3d"
@@ -101,6 +103,13 @@ FAULTS: dict[str, tuple[Callable[[Path], object], Words, tuple[str, ...]]] = {
     ),
 }
 """What is made in an empty folder, the words of the command, what its message says."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _imported_once() -> None:
+    """Let this process import what the commands need, before it is forked."""
+    for words in (kinematics(), dynamics("motion_cutoff=-6"), imported("-o", "/proc/pathwalker")):
+        assert CliRunner().invoke(cli, words).exit_code == 2
 
 
 @pytest.mark.parametrize("fault", FAULTS)

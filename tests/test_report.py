@@ -17,7 +17,7 @@ import pytest
 import yaml
 from click.testing import CliRunner, Result
 
-from conftest import MadeSolution
+from conftest import MadeSolution, sketch
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.config.values import changed_values, differing_values
@@ -501,6 +501,21 @@ def write_studies(folder: Path, run: Path, note: str = "") -> None:
     write_uncertainty(result, folder / "uncertainty")
 
 
+@pytest.fixture
+def studies(written_studies: Path, tmp_path: Path) -> Path:
+    """Return a folder with a study of every kind that may be changed."""
+    return Path(shutil.copytree(written_studies, tmp_path / "studies"))
+
+
+@pytest.fixture(scope="module")
+def written_studies(written: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("studies")
+    with pytest.MonkeyPatch.context() as patch:
+        sketch(patch)
+        write_studies(folder, written / "mapd-orthosis")
+    return folder
+
+
 def made_landscape(metrics: dict[str, Any], numbers: dict[str, float]) -> Landscape:
     """Return a landscape of four points, one with two local optima and one without a solution."""
     ends = np.array([5.0, 92.0])
@@ -571,8 +586,8 @@ def test_studies_beside_a_run_add_their_tables(runs: Path) -> None:
 
 @pytest.mark.drawn
 @pytest.mark.usefixtures("no_curves")
-def test_maps_fronts_and_spreads_are_drawn(runs: Path) -> None:
-    write_studies(runs, runs / "mapd-orthosis")
+def test_maps_fronts_and_spreads_are_drawn(runs: Path, written_studies: Path) -> None:
+    shutil.copytree(written_studies, runs, dirs_exist_ok=True)
     page = page_of([runs / "mapd-orthosis"])
     landscape = section(page, "Landscape")
     assert landscape.lines[0] == "Least cost at K_D 91.7, K_P 5.0 N m/rad (right side)."
@@ -622,19 +637,19 @@ def test_maps_fronts_and_spreads_are_drawn(runs: Path) -> None:
 )
 @pytest.mark.usefixtures("no_curves")
 def test_broken_studies_are_refused(
-    runs: Path, tmp_path: Path, file: str, wrong: dict[str, Any], told: str
+    runs: Path, studies: Path, tmp_path: Path, file: str, wrong: dict[str, Any], told: str
 ) -> None:
-    write_studies(tmp_path / "studies", runs / "mapd-orthosis")
-    path = tmp_path / "studies" / file
+    path = studies / file
     path.write_text(json.dumps(json.loads(path.read_text()) | wrong))
     sentence = refusal(runs / "mapd-orthosis", path.parent, "-o", tmp_path / "page.html")
     assert told in sentence
 
 
 @pytest.mark.usefixtures("no_curves")
-def test_studies_that_do_not_fit_are_refused_when_named(runs: Path, tmp_path: Path) -> None:
-    write_studies(tmp_path / "studies", runs / "mapd-orthosis")
-    studies, out = tmp_path / "studies", tmp_path / "page.html"
+def test_studies_that_do_not_fit_are_refused_when_named(
+    runs: Path, studies: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "page.html"
     named = page_of([runs / "mapd-orthosis", studies / "sensitivity"])
     assert section(named, "Sensitivity").tables
     assert "stands on another optimum" in refusal(
@@ -714,21 +729,21 @@ def test_kinds_of_pages_do_not_mix(runs: Path, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a study of four recorded trials."""
-    from pathwalker_cli.inverse import recorded_study
-    from pathwalker_cli.inverse.evaluate import dynamics_trials
-    from pathwalker_cli.inverse.study_tables import residual_tables, strength_table
+    from pathwalker_cli.inverse import files
+    from pathwalker_cli.inverse.residuals import residual_tables
+    from pathwalker_cli.inverse.strengths import strength_table
+    from pathwalker_cli.inverse.trials import dynamics_trials
 
     folder = tmp_path_factory.mktemp("recorded")
     study = load_inverse_dynamics("inverse-dynamics", ("conditions=[barefoot]",))
     patient = load_patient(study.patient)
     trials = dynamics_trials(study, patient, lambda _: None)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(recorded_study, "save_recorded_figures", lambda *_: ())
-        recorded_study.write_dynamics(
+        patch.setattr(files, "save_recorded_figures", lambda *_: ())
+        files.write_dynamics(
             folder, trials, residual_tables(trials, patient, study),
-            strength_table(trials, patient, study), patient.body_mass, study.method,
+            strength_table(trials, patient, study), patient, study.method,
         )  # fmt: skip
-        recorded_study.write_origin(folder, patient, study.method)
     return folder
 
 

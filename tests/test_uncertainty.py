@@ -20,8 +20,6 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results import run_folder
-from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies import pool
 from pathwalker_cli.studies.base import base_run, load_study
 from pathwalker_cli.studies.uncertainty import study as module
@@ -148,15 +146,6 @@ def test_chance_level_is_exceeded_by_idle_inputs_in_five_of_a_hundred_studies() 
 # The command
 
 
-@pytest.fixture(scope="module")
-def run_folder_path(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("runs") / "orthosis"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
-        write_run(folder, made_solution("mapd-orthosis"))
-    return folder
-
-
 @pytest.fixture
 def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
     stand_in = StandInResolver(load_case("mapd-orthosis"))
@@ -167,7 +156,7 @@ def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
 
 
 @pytest.fixture
-def call(run_folder_path: Path, resolver: StandInResolver, tmp_path: Path) -> Callable[..., Result]:
+def call(made_runs: Path, resolver: StandInResolver, tmp_path: Path) -> Callable[..., Result]:
     study = tmp_path / "study.yaml"
     study.write_text(
         "base: mapd-orthosis\ndraws: 20\nquantities:\n"
@@ -177,7 +166,15 @@ def call(run_folder_path: Path, resolver: StandInResolver, tmp_path: Path) -> Ca
     )
 
     def run(*words: object) -> Result:
-        options = ["--run", run_folder_path, "--out", tmp_path / "out", "--workers", 1, *words]
+        options = [
+            "--run",
+            made_runs / "mapd-orthosis",
+            "--out",
+            tmp_path / "out",
+            "--workers",
+            1,
+            *words,
+        ]
         return CliRunner().invoke(cli, ["uncertainty", str(study), *map(str, options)])
 
     return run

@@ -21,7 +21,6 @@ from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.config import StudyConfig, config_content, find_config
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import ConfigError, placed
-from pathwalker_cli.inverse.evaluate import require_trials
 from pathwalker_cli.inverse.markers import MarkerSet, load_marker_set, marker_points
 from pathwalker_cli.inverse.study import (
     InverseDynamicsConfig,
@@ -30,6 +29,7 @@ from pathwalker_cli.inverse.study import (
     load_inverse_dynamics,
     load_inverse_kinematics,
 )
+from pathwalker_cli.inverse.trials import require_trials
 from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.yaml_file import load_yaml

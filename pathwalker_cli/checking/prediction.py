@@ -229,8 +229,7 @@ def _rows(solver: GaitSolver, content: Mapping[str, Any], seconds: Seconds) -> I
 
 def _weights(solver: GaitSolver) -> dict[str, float]:
     """Return the terms of the objective with their weights; those without any are left out."""
-    goals = solver.config.cost.goals
-    weights = {name: value for name, value in solver.weights.items() if name not in goals}
+    weights = solver.weights
     if not solver.config.fits:
         weights |= {"fit": 0.0, "excitation": 0.0}
     named = {
@@ -241,8 +240,7 @@ def _weights(solver: GaitSolver) -> dict[str, float]:
         "fit": "squared distance from the recording",
         "excitation": "squared excitations",
     }
-    terms = {named.get(name, name): value for name, value in weights.items() if value}
-    return terms | {f"goal {n}": v for n, v in solver.config.cost.goals.items() if v}
+    return {named.get(name, f"goal {name}"): value for name, value in weights.items() if value}
 
 
 def _bounds(solver: GaitSolver) -> dict[str, str]:

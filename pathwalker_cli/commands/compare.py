@@ -52,7 +52,7 @@ def _write(out: Path, comparison: Comparison) -> None:
     """Write tables and figures, all or none."""
     from pathwalker_cli.evaluation.curves import traces
     from pathwalker_cli.evaluation.figures import save_overlays
-    from pathwalker_cli.inverse.recorded_files import staged_folder
+    from pathwalker_cli.io.atomic import staged_folder
     from pathwalker_cli.io.json_file import write_json
     from pathwalker_cli.report.compare import comparison_content, write_comparison_csv
 
@@ -133,7 +133,7 @@ def _write_evaluation(
     from pathwalker_cli.evaluation.curves import Trace
     from pathwalker_cli.evaluation.figures import save_evaluation_figures
     from pathwalker_cli.evaluation.tables import write_csv
-    from pathwalker_cli.inverse.recorded_files import staged_folder
+    from pathwalker_cli.io.atomic import staged_folder
     from pathwalker_cli.io.json_file import write_json
 
     with staged_folder(out) as folder:

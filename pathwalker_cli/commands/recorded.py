@@ -22,9 +22,9 @@ from pathwalker_cli.conventions import CONDITIONS, Condition
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from pathwalker_cli.inverse.evaluate import Progress, StudyTrial
+    from pathwalker_cli.inverse.strengths import StrengthTable
     from pathwalker_cli.inverse.study import RecordedConfig
-    from pathwalker_cli.inverse.study_tables import StrengthTable
+    from pathwalker_cli.inverse.trials import Progress, Trial
     from pathwalker_cli.patient import Patient
 
     Config = TypeVar("Config", bound=RecordedConfig)
@@ -61,11 +61,11 @@ def import_command(
     Beside a patient's file, in recordings/barefoot or recordings/orthosis, they are found by id and
     by the problems that start from recorded gait.
     """
-    from pathwalker_cli.inverse.evaluate import kinematics_trials
-    from pathwalker_cli.inverse.recorded_files import write_trial
+    from pathwalker_cli.inverse.files import write_trial
     from pathwalker_cli.inverse.study import Paths, RecordedConfig
+    from pathwalker_cli.inverse.trials import kinematics_trials
 
-    def write(folder: Path, trials: Sequence[StudyTrial], who: Patient) -> _Findings:
+    def write(folder: Path, trials: Sequence[Trial], who: Patient) -> _Findings:
         for trial in trials:
             write_trial(folder, trial)
         return _Findings()
@@ -82,11 +82,11 @@ def import_command(
 @_QUIET
 def ik_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: bool) -> None:
     """Compute joint angles from the markers of the C3D files that CONFIG names."""
-    from pathwalker_cli.inverse.evaluate import kinematics_trials
-    from pathwalker_cli.inverse.recorded_study import write_kinematics
+    from pathwalker_cli.inverse.files import write_kinematics
     from pathwalker_cli.inverse.study import load_inverse_kinematics
+    from pathwalker_cli.inverse.trials import kinematics_trials
 
-    def write(folder: Path, trials: Sequence[StudyTrial], patient: Patient) -> _Findings:
+    def write(folder: Path, trials: Sequence[Trial], patient: Patient) -> _Findings:
         write_kinematics(folder, trials, patient.body_mass)
         return _Findings()
 
@@ -119,27 +119,23 @@ def id_command(
     With --update-patient the blocks `strengths` and `recorded` of the patient's file are replaced,
     or added; everything else in it, comments too, stays as it is.
     """
-    from pathwalker_cli.inverse.evaluate import dynamics_trials
-    from pathwalker_cli.inverse.patient_update import require_own_patient
-    from pathwalker_cli.inverse.recorded_study import write_dynamics, write_origin
-    from pathwalker_cli.inverse.recorded_text import (
+    from pathwalker_cli.inverse.files import write_dynamics
+    from pathwalker_cli.inverse.recorded import require_own_patient
+    from pathwalker_cli.inverse.residuals import residual_tables, study_warnings
+    from pathwalker_cli.inverse.strengths import strength_table
+    from pathwalker_cli.inverse.study import load_inverse_dynamics
+    from pathwalker_cli.inverse.text import (
         dynamics_content,
         residuals_renderable,
         strengths_renderable,
     )
-    from pathwalker_cli.inverse.study import load_inverse_dynamics
-    from pathwalker_cli.inverse.study_tables import (
-        residual_tables,
-        strength_table,
-        study_warnings,
-    )
+    from pathwalker_cli.inverse.trials import dynamics_trials
     from pathwalker_cli.patient import load_patient
 
-    def write(folder: Path, trials: Sequence[StudyTrial], patient: Patient) -> _Findings:
+    def write(folder: Path, trials: Sequence[Trial], patient: Patient) -> _Findings:
         tables = residual_tables(trials, patient, study)
         strengths = strength_table(trials, patient, study)
-        write_dynamics(folder, trials, tables, strengths, patient.body_mass, study.method)
-        write_origin(folder, patient, study.method)
+        write_dynamics(folder, trials, tables, strengths, patient, study.method)
         warnings = study_warnings(trials, tables, patient, study.largest_residual)
         shown = (residuals_renderable(tables), strengths_renderable(strengths))
         changed = _updated(patient, trials, strengths, study.method) if update_patient else ""
@@ -153,16 +149,14 @@ def id_command(
     _study(study, dynamics_trials, write, out or Path("runs", study.study), quiet)
 
 
-def _updated(
-    patient: Patient, trials: Sequence[StudyTrial], table: StrengthTable, method: str
-) -> str:
+def _updated(patient: Patient, trials: Sequence[Trial], table: StrengthTable, method: str) -> str:
     """Put what was found into the patient's file; return a sentence about it."""
-    from pathwalker_cli.inverse.patient_update import (
+    from pathwalker_cli.inverse.files import strengths_source
+    from pathwalker_cli.inverse.recorded import (
         recorded_blocks,
         require_own_patient,
         update_patient,
     )
-    from pathwalker_cli.inverse.recorded_study import strengths_source
 
     path, blocks = require_own_patient(patient), recorded_blocks(patient, trials)
     update_patient(path, table.strengths, strengths_source(method), blocks)
@@ -183,8 +177,8 @@ class _Findings:
 
 def _study(
     config: Config,
-    evaluate: Callable[[Config, Patient, Progress], Sequence[StudyTrial]],
-    write: Callable[[Path, Sequence[StudyTrial], Patient], _Findings],
+    evaluate: Callable[[Config, Patient, Progress], Sequence[Trial]],
+    write: Callable[[Path, Sequence[Trial], Patient], _Findings],
     out: Path,
     quiet: bool,
 ) -> None:
@@ -199,8 +193,8 @@ def _study(
     """
     from rich.console import Console
 
-    from pathwalker_cli.inverse.recorded_files import staged_folder
-    from pathwalker_cli.inverse.recorded_text import stance_notes, trial_warnings, trials_renderable
+    from pathwalker_cli.inverse.text import stance_notes, trial_warnings, trials_renderable
+    from pathwalker_cli.io.atomic import staged_folder
     from pathwalker_cli.patient import load_patient
 
     patient = load_patient(config.patient)

@@ -12,13 +12,12 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.evaluation.paper import PATIENT, REFERENCE_STRIDES
-from pathwalker_cli.inverse.bands import resampled
-from pathwalker_cli.inverse.cycles import GaitCycle, stances
-from pathwalker_cli.inverse.evaluate import StudyTrial, recorded_trials
-from pathwalker_cli.inverse.filters import frame_rate
+from pathwalker_cli.inverse.cycles import GaitCycle, resampled, stances
+from pathwalker_cli.inverse.dynamics import frame_rate
 from pathwalker_cli.inverse.recorded import trial_steps
 from pathwalker_cli.inverse.strengths import stance_curves
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
+from pathwalker_cli.inverse.trials import Trial, recorded_trials
 from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.stride.measures import measures_in
@@ -81,9 +80,9 @@ class RecordedGait:
     """
 
     walker: Walker
-    trials: tuple[StudyTrial, ...]
+    trials: tuple[Trial, ...]
 
-    def trial(self, name: str) -> StudyTrial | None:
+    def trial(self, name: str) -> Trial | None:
         """Return the trial of this name, or None."""
         return next((each for each in self.trials if each.name == name), None)
 
@@ -143,7 +142,7 @@ def recorded_numbers(recorded: RecordedGait) -> dict[str, Spread]:
 
 
 def _excerpt(
-    walker: Walker, trial: StudyTrial, part: Part, first: int, last: int, **known: Any
+    walker: Walker, trial: Trial, part: Part, first: int, last: int, **known: Any
 ) -> Stride:
     """Return some frames of a trial, the last one included."""
     motion, rows = trial.motion, slice(first, last + 1)
@@ -151,7 +150,7 @@ def _excerpt(
     return Stride(trial.name, walker, q=motion.values[rows], part=part, **(values | known))
 
 
-def _strides(walker: Walker, trial: StudyTrial) -> Iterator[Stride]:
+def _strides(walker: Walker, trial: Trial) -> Iterator[Stride]:
     """Yield everything that a trial shows."""
     rate = frame_rate(trial.motion)
     yield _excerpt(walker, trial, "recording", 0, trial.motion.time.size - 1)
@@ -168,7 +167,7 @@ def _strides(walker: Walker, trial: StudyTrial) -> Iterator[Stride]:
         yield from _measured(walker, trial, side)
 
 
-def _cycle(walker: Walker, trial: StudyTrial, cycle: GaitCycle, rate: float) -> Stride:
+def _cycle(walker: Walker, trial: Trial, cycle: GaitCycle, rate: float) -> Stride:
     """Return a gait cycle; the other side's stance where the cycle shows all of its swing."""
     side, start, frames = cycle.side, cycle.start, cycle.end - cycle.start
     spans = {side: (0.0, (cycle.toe_off - start) / rate)}
@@ -196,7 +195,7 @@ def _in_the_air_at_last(values: np.ndarray, cycle: GaitCycle) -> np.ndarray:
     return np.vstack([values[cycle.start : cycle.end], values[cycle.end - 1 : cycle.end]])
 
 
-def _measured(walker: Walker, trial: StudyTrial, side: Side) -> Iterator[Stride]:
+def _measured(walker: Walker, trial: Trial, side: Side) -> Iterator[Stride]:
     """Yield forces, then ankle angles and torques, of a side's measured stances."""
     for item in trial.stances if trial.forces is not None else ():
         rows = slice(item.stance.strike, item.stance.toe_off + 1)
@@ -212,14 +211,14 @@ def _measured(walker: Walker, trial: StudyTrial, side: Side) -> Iterator[Stride]
         yield _curve(walker, trial, "stance", side, q=q, net_torque=net)
 
 
-def _curve(walker: Walker, trial: StudyTrial, part: Part, side: Side, **known: Any) -> Stride:
+def _curve(walker: Walker, trial: Trial, part: Part, side: Side, **known: Any) -> Stride:
     """Return a piece over 0 to 100 % of its own length, whose posture may not be known."""
     q = np.full((POINTS, len(COORDINATES)), np.nan)
     values: dict[str, Any] = {"q": q, "stances": {side: (0.0, 1.0)}, "part": part, "side": side}
     return Stride(trial.name, walker, np.linspace(0.0, 1.0, POINTS), **(values | known))
 
 
-def _forces(trial: StudyTrial, side: Side) -> np.ndarray:
+def _forces(trial: Trial, side: Side) -> np.ndarray:
     """Return (forward, up) on a foot in every frame [N], NaN where not measured, shape (n, 2)."""
     if trial.forces is None:
         raise ValueError(f"trial {trial.name} has no forces")
@@ -279,12 +278,12 @@ def reference_stride(recorded: RecordedGait, name: str | None = None) -> Stride 
     return chosen
 
 
-def left_toe_off_stride(walker: Walker, trial: StudyTrial) -> Stride | None:
+def left_toe_off_stride(walker: Walker, trial: Trial) -> Stride | None:
     """Return the first stride of a trial from one left toe-off to the next, or None."""
     offs = _left_toe_offs(trial)
     return _excerpt(walker, trial, "stride", offs[0], offs[1]) if len(offs) > 1 else None
 
 
-def _left_toe_offs(trial: StudyTrial) -> list[int]:
+def _left_toe_offs(trial: Trial) -> list[int]:
     """Return the frames in which the left toe leaves the ground."""
     return [e.frame for e in trial.events if (e.side, e.kind) == ("left", "toe_off")]

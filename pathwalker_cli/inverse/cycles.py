@@ -1,28 +1,40 @@
-"""Stances, gait cycles and steps from foot strikes and toe-offs."""
+"""Stances, gait cycles and steps from foot strikes and toe-offs, and curves over the cycles."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, SIDES, Side
-from pathwalker_cli.io.c3d import Event
+from pathwalker_cli.conventions import ANGLES, SIDES, Side
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.c3d import Event, EventKind
 from pathwalker_cli.trajectory import Trajectory
 
 __all__ = [
+    "OTHER",
+    "POINTS",
+    "CycleBand",
     "GaitCycle",
     "Stance",
+    "cycle_band",
     "gait_cycles",
     "joint_ranges",
+    "resampled",
+    "single_support",
     "stances",
     "step_lengths",
     "swings",
     "walking_speed",
 ]
+
+OTHER: Final[Mapping[Side, Side]] = {"right": "left", "left": "right"}
+
+POINTS: Final = 101
+"""Points of a normalised curve: one per cent each."""
 
 FLAT: Final = (0.1, 0.25)
 """When after its strike a foot surely stands flat, also at the fastest recorded walk [s]."""
@@ -42,6 +54,11 @@ class Stance:
     strike: int
     toe_off: int
 
+    @property
+    def rows(self) -> slice:
+        """All frames, strike and toe-off among them."""
+        return slice(self.strike, self.toe_off + 1)
+
 
 @dataclass(frozen=True)
 class GaitCycle:
@@ -59,38 +76,55 @@ class GaitCycle:
     toe_off: int
     end: int
 
-
-def stances(events: tuple[Event, ...]) -> tuple[Stance, ...]:
-    """Return the stances that the recording shows from strike to toe-off, in order of time."""
-    found = []
-    for side in SIDES:
-        own = [event for event in events if event.side == side]
-        for first, second in pairwise(own):
-            if (first.kind, second.kind) == ("foot_strike", "toe_off"):
-                found.append(Stance(first.side, first.frame, second.frame))
-    return tuple(sorted(found, key=lambda stance: stance.strike))
+    @property
+    def rows(self) -> slice:
+        """All frames, both strikes among them."""
+        return slice(self.start, self.end + 1)
 
 
-def gait_cycles(events: tuple[Event, ...]) -> tuple[GaitCycle, ...]:
-    """Return the gait cycles that the recording shows in full, in order of time."""
-    found = []
-    for side in SIDES:
-        own = [event for event in events if event.side == side]
-        for first, off, second in zip(own, own[1:], own[2:], strict=False):
-            kinds = (first.kind, off.kind, second.kind)
-            if kinds == ("foot_strike", "toe_off", "foot_strike"):
-                found.append(GaitCycle(first.side, first.frame, off.frame, second.frame))
-    return tuple(sorted(found, key=lambda cycle: cycle.start))
-
-
-def swings(events: tuple[Event, ...], side: Side) -> tuple[tuple[int, int], ...]:
-    """Return toe-off and next strike of a foot's swings that the recording shows in full."""
+def _frames(events: Sequence[Event], side: Side, *kinds: EventKind) -> tuple[tuple[int, ...], ...]:
+    """Return the frames of a side's events wherever they follow one another in these kinds."""
     own = [event for event in events if event.side == side]
+    runs = zip(*(own[first:] for first in range(len(kinds))), strict=False)
     return tuple(
-        (off.frame, strike.frame)
-        for off, strike in pairwise(own)
-        if (off.kind, strike.kind) == ("toe_off", "foot_strike")
+        tuple(event.frame for event in run)
+        for run in runs
+        if tuple(event.kind for event in run) == kinds
     )
+
+
+def stances(events: Sequence[Event]) -> tuple[Stance, ...]:
+    """Return the stances that the recording shows from strike to toe-off, in order of time."""
+    every = [
+        Stance(side, *frames)
+        for side in SIDES
+        for frames in _frames(events, side, "foot_strike", "toe_off")
+    ]
+    return tuple(sorted(every, key=lambda stance: stance.strike))
+
+
+def gait_cycles(events: Sequence[Event]) -> tuple[GaitCycle, ...]:
+    """Return the gait cycles that the recording shows in full, in order of time."""
+    every = [
+        GaitCycle(side, *frames)
+        for side in SIDES
+        for frames in _frames(events, side, "foot_strike", "toe_off", "foot_strike")
+    ]
+    return tuple(sorted(every, key=lambda cycle: cycle.start))
+
+
+def swings(events: Sequence[Event], side: Side) -> tuple[tuple[int, ...], ...]:
+    """Return toe-off and next strike of a foot's swings that the recording shows in full."""
+    return _frames(events, side, "toe_off", "foot_strike")
+
+
+def single_support(stance: Stance, events: Sequence[Event]) -> np.ndarray:
+    """Return the frames of a stance in which the other foot is in the air."""
+    frames = np.arange(stance.strike, stance.toe_off + 1)
+    alone = np.zeros(frames.size, dtype=bool)
+    for off, strike in swings(events, OTHER[stance.side]):
+        alone |= (frames > off) & (frames < strike)
+    return frames[alone]
 
 
 def step_lengths(
@@ -110,7 +144,7 @@ def step_lengths(
         Per side, lengths of its steps [m].
     """
     strikes = [event for event in events if event.kind == "foot_strike"]
-    lengths: dict[Side, list[float]] = {"right": [], "left": []}
+    lengths: dict[Side, list[float]] = {side: [] for side in SIDES}
     for other, own in pairwise(strikes):
         length = _flat(heels[own.side], own, rate) - _flat(heels[other.side], other, rate)
         if own.side != other.side and np.isfinite(length):
@@ -131,7 +165,7 @@ def walking_speed(motion: Trajectory) -> float:
 
 
 def joint_ranges(
-    motions: tuple[tuple[Trajectory, tuple[GaitCycle, ...]], ...],
+    motions: Sequence[tuple[Trajectory, tuple[GaitCycle, ...]]],
 ) -> dict[str, tuple[float, float]]:
     """Return the lowest and highest angle [rad] of every joint over gait cycles.
 
@@ -139,13 +173,65 @@ def joint_ranges(
         motions: Motions of several trials with their cycles.
     """
     ranges = {}
-    for name in COORDINATES[2:]:
-        parts = [
-            motion[name][cycle.start : cycle.end + 1]
-            for motion, cycles in motions
-            for cycle in cycles
-        ]
+    for name in ANGLES:
+        parts = [motion[name][cycle.rows] for motion, cycles in motions for cycle in cycles]
         if parts:
             values = np.concatenate(parts)
             ranges[name] = (float(values.min()), float(values.max()))
     return ranges
+
+
+@dataclass(frozen=True)
+class CycleBand:
+    """Statistics over gait cycles, from strike (0 %) to the next strike of the same foot (100 %).
+
+    Args:
+        names: Column names, m of them.
+        mean: Mean, shape (POINTS, m); NaN where no cycle has a value.
+        deviation: Standard deviation between cycles, shape (POINTS, m).
+        lowest: Smallest value, shape (POINTS, m).
+        highest: Largest value, shape (POINTS, m).
+        count: Number of cycles that have a value, shape (POINTS, m).
+        toe_off: Mean position of the toe-off [%].
+    """
+
+    names: tuple[str, ...]
+    mean: np.ndarray
+    deviation: np.ndarray
+    lowest: np.ndarray
+    highest: np.ndarray
+    count: np.ndarray
+    toe_off: float
+
+
+def resampled(columns: np.ndarray) -> np.ndarray:
+    """Return columns over 0 to 100 % of their length, shape (n, m) to (POINTS, m)."""
+    old, new = np.linspace(0.0, 1.0, len(columns)), np.linspace(0.0, 1.0, POINTS)
+    return np.stack([np.interp(new, old, column) for column in columns.T], axis=1)
+
+
+def cycle_band(trials: Sequence[tuple[Trajectory, tuple[GaitCycle, ...]]], side: Side) -> CycleBand:
+    """Return mean and spread of curves over the gait cycles of one side.
+
+    Args:
+        trials: Curves of several trials, NaN where not measured, with their gait cycles.
+        side: Side whose strike starts the cycle.
+
+    Raises:
+        DataError: If the trials show no complete cycle of that side.
+    """
+    own = [(curve, c) for curve, cycles in trials for c in cycles if c.side == side]
+    if not own:
+        raise DataError(f"the trials show no complete gait cycle of the {side} side")
+    stacked = np.array([resampled(curve.values[cycle.rows]) for curve, cycle in own])
+    toe_off = 100.0 * float(np.mean([(c.toe_off - c.start) / (c.end - c.start) for _, c in own]))
+    known = np.isfinite(stacked)
+    count = known.sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        mean = np.where(known, stacked, 0.0).sum(axis=0) / count
+        square = (np.where(known, stacked - mean, 0.0) ** 2).sum(axis=0) / count
+    lowest = np.where(known, stacked, np.inf).min(axis=0)
+    highest = np.where(known, stacked, -np.inf).max(axis=0)
+    lowest[count == 0] = highest[count == 0] = np.nan
+    names = trials[0][0].names
+    return CycleBand(names, mean, np.sqrt(square), lowest, highest, count, toe_off)

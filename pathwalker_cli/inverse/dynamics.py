@@ -1,28 +1,71 @@
-"""Generalised forces that explain a motion under measured ground forces."""
+"""The rates of a filtered motion, and the generalised forces that explain it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
 
-from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side, force_unit
-from pathwalker_cli.inverse.filters import MOTION_CUTOFF, smooth_rates
-from pathwalker_cli.inverse.forces import GroundForces
+from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, force_unit
+from pathwalker_cli.io.recordings import foot_columns
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["gait_torques", "inverse_dynamics"]
+__all__ = [
+    "FORCE_CUTOFF",
+    "MOTION_CUTOFF",
+    "frame_rate",
+    "generalised_forces",
+    "inverse_dynamics",
+    "low_pass",
+    "smooth_rates",
+]
+
+MOTION_CUTOFF: Final = 6.0
+"""Cut-off of joint angles [Hz]; usual for walking (Winter 2009, section 3.4)."""
+
+FORCE_CUTOFF: Final = 20.0
+"""Cut-off of plate channels [Hz]: keeps the load's rise, removes the plates' ringing."""
+
+_ORDER: Final = 2
+"""Order of the filter in each direction; there and back makes four."""
+
+
+def low_pass(values: np.ndarray, rate: float, cutoff: float) -> np.ndarray:
+    """Return columns after a zero-lag Butterworth filter of fourth order.
+
+    Args:
+        values: Samples, shape (n, ...).
+        rate: Samples per second [1/s].
+        cutoff: Frequency at which half of the power passes each way [Hz], below half of `rate`.
+    """
+    sections = butter(_ORDER, cutoff, fs=rate, output="sos")
+    return np.asarray(sosfiltfilt(sections, values, axis=0))
+
+
+def frame_rate(motion: Trajectory) -> float:
+    """Return the frames per second of an evenly sampled motion [1/s]."""
+    return (motion.time.size - 1) / motion.duration
+
+
+def smooth_rates(
+    motion: Trajectory, cutoff: float = MOTION_CUTOFF
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return filtered values with their first and second derivatives, each of shape (n, m).
+
+    Args:
+        motion: Evenly sampled motion.
+        cutoff: Cut-off frequency [Hz].
+    """
+    smooth = low_pass(motion.values, frame_rate(motion), cutoff)
+    spline = CubicSpline(motion.time, smooth, axis=0)
+    return smooth, np.asarray(spline(motion.time, 1)), np.asarray(spline(motion.time, 2))
 
 
 def inverse_dynamics(
-    model: pin.Model,
-    q: np.ndarray,
-    v: np.ndarray,
-    vdot: np.ndarray,
-    force: Mapping[Side, np.ndarray],
-    centre: Mapping[Side, np.ndarray],
+    model: pin.Model, q: np.ndarray, v: np.ndarray, vdot: np.ndarray, forces: Trajectory
 ) -> np.ndarray:
     """Return generalised forces by recursive Newton-Euler, frame by frame.
 
@@ -35,54 +78,38 @@ def inverse_dynamics(
         q: Coordinates [m, rad], shape (n, 10).
         v: Velocities [m/s, rad/s], shape (n, 10).
         vdot: Accelerations [m/s^2, rad/s^2], shape (n, 10).
-        force: Per side, ground reaction force on the foot (forward, up) [N], shape (n, 2).
-        centre: Per side, forward position of the centre of pressure on the ground [m], shape (n,);
-            may be NaN where the force is zero.
+        forces: Columns of `FORCE_COLUMNS` in n frames; the centre of pressure may be NaN where the
+            force is zero.
 
     Returns:
         Generalised forces [N, N m] in the order of `COORDINATES`, shape (n, 10).
     """
     data: Any = model.createData()
     tau = np.empty_like(v)
-    feet = {side: model.getJointId(f"ankle_{SUFFIX[side]}") for side in SIDES}
-    wrenches = {side: _wrench(force[side], centre[side]) for side in force}
+    wrenches = {
+        model.getJointId(f"ankle_{SUFFIX[side]}"): _wrench(
+            *forces.select(foot_columns(side)).values.T
+        )
+        for side in SIDES
+    }
     external = pin.StdVec_Force()
     for _ in range(model.njoints):
         external.append(pin.Force.Zero())
     for frame in range(q.shape[0]):
         pin.forwardKinematics(model, data, q[frame])
-        for side, wrench in wrenches.items():
-            foot = feet[side]
+        for foot, wrench in wrenches.items():
             external[foot] = data.oMi[foot].actInv(pin.Force(wrench[frame]))
         tau[frame] = pin.rnea(model, data, q[frame], v[frame], vdot[frame], external)
     return tau
 
 
-def gait_torques(
-    model: pin.Model, motion: Trajectory, forces: GroundForces, cutoff: float = MOTION_CUTOFF
-) -> Trajectory:
-    """Return residuals and joint torques of a recorded motion, NaN where a force is not measured.
-
-    Args:
-        model: The walker.
-        motion: Its coordinates in every frame, from `inverse_kinematics`.
-        forces: The forces on both feet in the same frames.
-        cutoff: Cut-off frequency of the motion [Hz].
-
-    Returns:
-        Generalised forces in the order of `COORDINATES`.
-    """
-    q, v, vdot = smooth_rates(motion, cutoff)
-    tau = inverse_dynamics(model, q, v, vdot, forces.force, forces.centre)
-    units = tuple(force_unit(name) for name in COORDINATES)
-    return Trajectory(motion.time, COORDINATES, tau, units)
+def generalised_forces(time: np.ndarray, tau: np.ndarray) -> Trajectory:
+    """Return generalised forces [N, N m], shape (n, 10), over the time of the frames [s]."""
+    return Trajectory(time, COORDINATES, tau, tuple(force_unit(name) for name in COORDINATES))
 
 
-def _wrench(force: np.ndarray, centre: np.ndarray) -> np.ndarray:
+def _wrench(forward: np.ndarray, up: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Return force and moment about the world's origin, shape (n, 6), of forces on the ground."""
-    wrench = np.zeros((force.shape[0], 6))
-    wrench[:, 0] = force[:, 0]
-    wrench[:, 2] = force[:, 1]
-    lever = np.where(force[:, 1] == 0.0, 0.0, centre)
-    wrench[:, 4] = -lever * force[:, 1]
-    return wrench
+    moment = -np.where(up == 0.0, 0.0, centre) * up
+    none = np.zeros_like(up)
+    return np.stack([forward, none, up, none, moment, none], axis=1)

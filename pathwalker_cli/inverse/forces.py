@@ -1,4 +1,4 @@
-"""Ground reaction force and centre of pressure of each foot from the force plates.
+"""From force plates to the ground reaction force and centre of pressure of each foot.
 
 A force counts only if one foot alone, and all of it, stood on one plate; everything else is NaN,
 which means "not measured".  A foot in the air has zero force.
@@ -6,7 +6,7 @@ which means "not measured".  A foot in the air has zero force.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -15,10 +15,9 @@ import pinocchio as pin
 
 from pathwalker_cli.conventions import GRAVITY, SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.cycles import Stance, stances, swings
-from pathwalker_cli.inverse.direction import WalkingPlane
-from pathwalker_cli.inverse.filters import FORCE_CUTOFF, low_pass, smooth_rates
-from pathwalker_cli.inverse.plates import PlateLoad, centre_of_pressure, plate_load
+from pathwalker_cli.inverse.cycles import stances, swings
+from pathwalker_cli.inverse.dynamics import FORCE_CUTOFF, low_pass, smooth_rates
+from pathwalker_cli.inverse.markers import WalkingPlane
 from pathwalker_cli.inverse.stance_checks import (
     EDGE,
     LOADED,
@@ -27,24 +26,88 @@ from pathwalker_cli.inverse.stance_checks import (
     judge,
     outside,
 )
-from pathwalker_cli.io.c3d import ForcePlate, Recording
+from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
 from pathwalker_cli.io.recordings import FORCE_COLUMNS
 from pathwalker_cli.trajectory import Trajectory
 
 __all__ = [
-    "BOTH",
     "GroundForces",
+    "PlateLoad",
+    "centre_of_pressure",
     "foot_extents",
     "foot_points",
     "force_columns",
     "ground_forces",
     "plate_direction",
+    "plate_load",
 ]
-
-BOTH: Final[tuple[Side, Side]] = ("right", "left")
 
 _FAR: Final = 0.2
 """Distance beyond which it does not matter how far a load lies from a foot [m]."""
+
+
+@dataclass(frozen=True)
+class PlateLoad:
+    """What a plate measures, at its sensors' level below its centre.
+
+    Args:
+        force: Ground reaction force on the body [N], laboratory axes, shape (samples, 3).
+        moment: Moment about the plate's centre at the sensors' level [N m], laboratory axes.
+        centre: Centre of the plate's surface in the laboratory [m], shape (3,).
+        depth: Depth of the sensors below the surface [m].
+    """
+
+    force: np.ndarray
+    moment: np.ndarray
+    centre: np.ndarray
+    depth: float
+
+
+def plate_load(plate: ForcePlate, channels: np.ndarray | None = None) -> PlateLoad:
+    """Return the load of a plate from its eight channels.
+
+    Args:
+        plate: The plate.
+        channels: Its channels, already filtered or averaged [N], shape (samples, 8); those of the
+            plate if left out.
+    """
+    x12, x34, y14, y23, z1, z2, z3, z4 = (plate.channels if channels is None else channels).T
+    a, b = plate.half_length, plate.half_width
+    force = np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4], axis=-1)
+    moment = np.stack(
+        [
+            b * (z1 + z2 - z3 - z4),
+            a * (-z1 + z2 + z3 - z4),
+            b * (-x12 + x34) + a * (y14 - y23),
+        ],
+        axis=-1,
+    )
+    axes = _axes(plate.corners)
+    return PlateLoad(force @ axes, moment @ axes, plate.corners.mean(axis=0), plate.depth)
+
+
+def _axes(corners: np.ndarray) -> np.ndarray:
+    """Return the plate's unit axes in the laboratory, one a row."""
+    x = corners[0] - corners[1]
+    z = np.cross(x, corners[0] - corners[3])
+    y = np.cross(z, x)
+    return np.stack([axis / np.linalg.norm(axis) for axis in (x, y, z)])
+
+
+def centre_of_pressure(load: PlateLoad, least_force: float) -> np.ndarray:
+    """Return where the force's line of action meets the plate's surface [m], shape (samples, 3).
+
+    Without a moment about a horizontal axis at the surface; NaN where the vertical force is below
+    `least_force` [N].
+    """
+    fx, fy, fz = load.force.T
+    mx, my, _ = load.moment.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = -(my + load.depth * fx) / fz
+        y = (mx - load.depth * fy) / fz
+    point = np.stack([x, y, np.zeros_like(fz)], axis=-1) + load.centre
+    point[fz < least_force] = np.nan
+    return point
 
 
 @dataclass(frozen=True)
@@ -52,36 +115,25 @@ class GroundForces:
     """Forces on both feet.
 
     Args:
-        time: Time of the frames [s], shape (n,).
-        force: Per side, force on the foot (forward, up) [N], NaN where not measured, shape (n, 2).
-        centre: Per side, forward position of the centre of pressure [m], NaN without load, (n,).
+        table: Columns of `FORCE_COLUMNS` in every frame, NaN where not measured (centre of
+            pressure: or without load).
         stances: What is known about every stance.
         plane: How the walking direction lies in the plates' laboratory axes.
     """
 
-    time: np.ndarray
-    force: dict[Side, np.ndarray]
-    centre: dict[Side, np.ndarray]
+    table: Trajectory
     stances: tuple[StanceForce, ...]
     plane: WalkingPlane
 
-    def trajectory(self) -> Trajectory:
-        """Return the forces as `FORCE_COLUMNS`."""
-        return force_columns(self.time, self.force, self.centre)
 
-
-def force_columns(
-    time: np.ndarray, force: Mapping[Side, np.ndarray], centre: Mapping[Side, np.ndarray]
-) -> Trajectory:
-    """Return forces as the columns force_r_x, force_r_z, cop_r_x and the same on the left.
+def force_columns(time: np.ndarray, feet: Mapping[Side, np.ndarray]) -> Trajectory:
+    """Return the table of ground forces.
 
     Args:
         time: Time of the frames [s], shape (n,).
-        force: Per side, force on the foot (forward, up) [N], shape (n, 2).
-        centre: Per side, forward position of the centre of pressure [m], shape (n,).
+        feet: Per side, force forward and up [N] and centre of pressure forward [m], shape (n, 3).
     """
-    columns = [column for side in BOTH for column in (*force[side].T, centre[side])]
-    values = np.stack(columns, axis=1)
+    values = np.hstack([feet[side] for side in SIDES])
     return Trajectory(time, tuple(FORCE_COLUMNS), values, tuple(FORCE_COLUMNS.values()))
 
 
@@ -98,7 +150,7 @@ def ground_forces(
         recording: The recording.
         model: The walker, for the extents of its feet and its weight.
         motion: Its coordinates in every frame, from `inverse_kinematics`.
-        plane: How the walking direction lies in the plates' laboratory axes; found from where the
+        plane: How the walking direction lies in the plates' laboratory axes; that in which the
             loads lie under the feet if left out.
         cutoff: Cut-off frequency of the plate channels [Hz].
 
@@ -109,39 +161,36 @@ def ground_forces(
         raise DataError("has no force plates", where=recording.name)
     loads = [_load(plate, recording, cutoff) for plate in recording.plates]
     feet = foot_extents(model, motion.values)
-    found = stances(recording.events)
-    plane = plane or plate_direction(loads, feet, found)
+    plane = plane or plate_direction(loads, feet, recording.events)
     up = np.stack([load.force[:, 2] for load in loads], axis=1)
     points = np.stack(
         [plane.project(centre_of_pressure(load, LOADED))[:, 0] for load in loads], axis=1
     )
     seen = Evidence(recording.events, up, points, feet, _carried(model, motion))
-    judged = tuple(judge(stance, seen) for stance in found)
-    force, centre = _compose(recording, judged, [plane.project(x.force) for x in loads], points)
-    return GroundForces(recording.time, force, centre, judged, plane)
+    judged = tuple(judge(stance, seen) for stance in stances(recording.events))
+    table = _compose(recording, judged, [plane.project(load.force) for load in loads], points)
+    return GroundForces(table, judged, plane)
 
 
 def foot_extents(model: pin.Model, q: np.ndarray) -> dict[Side, np.ndarray]:
     """Return the forward positions of heel and toe [m] per side, each of shape (n, 2)."""
-    found = foot_points(model, q)[:, :, 0]
-    return {"right": found[:, :2], "left": found[:, 2:]}
+    return {side: points[..., 0] for side, points in foot_points(model, q).items()}
 
 
-def foot_points(model: pin.Model, q: np.ndarray) -> np.ndarray:
-    """Return right heel and toe, left heel and toe (forward, up) [m] in poses, shape (n, 4, 2)."""
+def foot_points(model: pin.Model, q: np.ndarray) -> dict[Side, np.ndarray]:
+    """Return heel and toe (forward, up) [m] per side in poses (n, 10), each of shape (n, 2, 2)."""
     data: Any = model.createData()
     frames = [model.getFrameId(f"{p}_{SUFFIX[s]}") for s in SIDES for p in ("heel", "toe")]
-    found = np.empty((q.shape[0], len(frames), 3))
+    points = np.empty((len(q), len(frames), 3))
     for row, pose in enumerate(q):
         pin.framesForwardKinematics(model, data, pose)
-        found[row] = [data.oMf[frame].translation for frame in frames]
-    return found[:, :, [0, 2]]
+        points[row] = [data.oMf[frame].translation for frame in frames]
+    each = np.split(points[:, :, [0, 2]], len(SIDES), axis=1)
+    return dict(zip(SIDES, each, strict=True))
 
 
 def plate_direction(
-    loads: list[PlateLoad],
-    feet: Mapping[Side, np.ndarray],
-    found: tuple[Stance, ...],
+    loads: Sequence[PlateLoad], feet: Mapping[Side, np.ndarray], events: Sequence[Event]
 ) -> WalkingPlane:
     """Return the laboratory direction of walking for which the loads lie under the standing feet.
 
@@ -151,10 +200,11 @@ def plate_direction(
     Args:
         loads: Loads of the plates at the marker frames.
         feet: Heel and toe per side [m].
-        found: The stances; if none loads a plate, the direction does not matter and is +x.
+        events: Foot strikes and toe-offs; without a stance that loads a plate, the direction does
+            not matter and is +x.
     """
     standing = {side: np.full(feet[side].shape, np.nan) for side in SIDES}
-    for stance in found:
+    for stance in stances(events):
         rows = slice(stance.strike, stance.toe_off)
         standing[stance.side][rows] = feet[stance.side][rows]
     misses: list[tuple[float, WalkingPlane]] = []
@@ -192,25 +242,20 @@ def _carried(model: pin.Model, motion: Trajectory) -> np.ndarray:
 
 def _compose(
     recording: Recording,
-    judged: tuple[StanceForce, ...],
-    forces: list[np.ndarray],
+    judged: Sequence[StanceForce],
+    forces: Sequence[np.ndarray],
     points: np.ndarray,
-) -> tuple[dict[Side, np.ndarray], dict[Side, np.ndarray]]:
-    """Return force and centre of pressure per side from measured stances and swings."""
+) -> Trajectory:
+    """Return force and centre of pressure of both feet from measured stances and swings."""
     frames = recording.positions.shape[0]
-    force: dict[Side, np.ndarray] = {}
-    centre: dict[Side, np.ndarray] = {}
-    for side in BOTH:
-        force[side] = np.full((frames, 2), np.nan)
-        centre[side] = np.full(frames, np.nan)
+    feet = {side: np.full((frames, 3), np.nan) for side in SIDES}
+    for side, foot in feet.items():
         for off, strike in swings(recording.events, side):
-            force[side][off + 1 : strike] = 0.0
+            foot[off + 1 : strike, :2] = 0.0
     for item in judged:
-        if item.plate is None or not item.measured:
-            continue
-        side, plate = item.stance.side, item.plate
-        rows = np.arange(max(item.stance.strike - EDGE, 0), min(item.stance.toe_off + EDGE, frames))
-        loaded = np.isfinite(points[rows, plate])
-        force[side][rows] = np.where(loaded[:, None], forces[plate][rows], 0.0)
-        centre[side][rows] = points[rows, plate]
-    return force, centre
+        if item.plate is not None and item.measured:
+            rows = slice(max(item.stance.strike - EDGE, 0), item.stance.toe_off + EDGE)
+            point = points[rows, item.plate]
+            force = np.where(np.isfinite(point)[:, None], forces[item.plate][rows], 0.0)
+            feet[item.stance.side][rows] = np.column_stack([force, point])
+    return force_columns(recording.time, feet)

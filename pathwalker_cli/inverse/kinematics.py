@@ -10,8 +10,7 @@ import pinocchio as pin
 
 from pathwalker_cli.conventions import COORDINATES, TRANSLATIONS, coordinate_unit
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.direction import WalkingPlane, walking_plane
-from pathwalker_cli.inverse.markers import MarkerPoint
+from pathwalker_cli.inverse.markers import MarkerPoint, WalkingPlane, walking_plane
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.trajectory import Trajectory
 
@@ -71,7 +70,7 @@ def inverse_kinematics(
         model: The walker, its q in the order of `COORDINATES`.
         recording: The recording.
         points: Where its markers sit on the walker.
-        plane: Walking plane; found from the travel of the pelvis markers if left out.
+        plane: Walking plane; that of the pelvis markers' travel if left out.
 
     Returns:
         The coordinates over time, time from the first frame on, and the distances that remain.
@@ -98,8 +97,8 @@ def inverse_kinematics(
 
 def pelvis_markers(points: tuple[MarkerPoint, ...]) -> tuple[str, ...]:
     """Return the markers on the pelvis, or all if there are none."""
-    found = tuple(point.marker for point in points if point.link == "pelvis")
-    return found or tuple(point.marker for point in points)
+    pelvis = [point for point in points if point.link == "pelvis"]
+    return tuple(point.marker for point in pelvis or points)
 
 
 def marker_paths(model: pin.Model, points: tuple[MarkerPoint, ...], q: np.ndarray) -> np.ndarray:
@@ -121,16 +120,20 @@ class _Fit:
             frame.placement.act(np.array([point.position[0], 0.0, point.position[1]]))
             for frame, point in zip(frames, points, strict=True)
         ]
-        chains = [[index - 1 for index in model.supports[j] if index > 0] for j in self.joints]
-        self.moves = np.array([[c in chain for c in range(model.nv)] for chain in chains])
-        self.lower, self.curved = _lower_hinges(model)
+        count = range(model.nv)
+        carries = np.array([[c + 1 in list(model.supports[j + 1]) for c in count] for j in count])
+        hinges = np.array([name not in TRANSLATIONS for name in COORDINATES])
+        self.moves = carries[np.array(self.joints) - 1]
+        self.curved = (carries | carries.T) & np.outer(hinges, hinges)
+        self.lower = np.maximum.outer(count, count)
 
     def start(self, target: np.ndarray) -> np.ndarray:
         """Return the upright pose among the markers of a first frame."""
         q = np.zeros(self.model.nq)
         seen = np.isfinite(target[:, 0])
         if seen.any():
-            q[:2] = (target - self.positions(q)[0])[seen].mean(axis=0)
+            moved = (target - self.positions(q)[0])[seen].mean(axis=0)
+            q[[COORDINATES.index(name) for name in TRANSLATIONS]] = moved
         return q
 
     def positions(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -194,21 +197,6 @@ class _Fit:
             else:
                 damping = max(10.0 * damping, DAMPING)
         raise DataError("markers and walker do not fit", where=where, mend="check the markers")
-
-
-def _lower_hinges(model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each pair of coordinates the lower hinge, and whether both turn one chain."""
-    count = model.nv
-    hinge = [name not in TRANSLATIONS for name in COORDINATES]
-    chains = [[index - 1 for index in model.supports[j + 1] if index > 0] for j in range(count)]
-    lower = np.maximum.outer(np.arange(count), np.arange(count))
-    curved = np.array(
-        [
-            [hinge[a] and hinge[b] and min(a, b) in chains[max(a, b)] for b in range(count)]
-            for a in range(count)
-        ]
-    )
-    return lower, curved
 
 
 def _downhill(hessian: np.ndarray, gradient: np.ndarray, damping: float) -> np.ndarray:

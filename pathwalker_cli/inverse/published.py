@@ -1,4 +1,4 @@
-"""Ground forces and rates exactly as in the published evaluation, with its shortcuts.
+"""The article's own evaluation of recorded gait, with its shortcuts.
 
 For comparison only: no filter, no gating, sensor depth ignored, each foot carries one plate's force
 over the whole trial, rates are forward differences, events two frames early, and only three of the
@@ -10,27 +10,37 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 import pinocchio as pin
+from scipy.signal import butter, filtfilt
 
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.direction import WalkingPlane
+from pathwalker_cli.inverse.cycles import GaitCycle, gait_cycles
 from pathwalker_cli.inverse.dynamics import inverse_dynamics
-from pathwalker_cli.inverse.plates import plate_load, wrench_axis_at_ground
-from pathwalker_cli.io.c3d import Event, Recording
+from pathwalker_cli.inverse.forces import PlateLoad, force_columns, plate_load
+from pathwalker_cli.inverse.markers import WalkingPlane
+from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.trajectory import Trajectory
 
 __all__ = [
+    "AVERAGED_TRIALS",
     "EVENT_SHIFT",
     "TURNED",
-    "PublishedForces",
+    "flagged_cycles",
     "forward_difference",
-    "published_forces",
+    "published_filter",
     "published_torques",
+    "wrench_axis_at_ground",
 ]
+
+AVERAGED_TRIALS: Final = {
+    "barefoot": ("3053176", "3053178", "3053179", "3053183", "3053184"),
+    "orthosis": ("3053141", "3053142", "3053144", "3053146"),
+}
+"""Trials whose inverse dynamics the published evaluation averages."""
 
 EVENT_SHIFT: Final = -2
 """Frames by which the published evaluation reads every event too early."""
@@ -39,34 +49,66 @@ TURNED: Final = frozenset({"3053176", "3053178", "3053183"})
 """Trials that the published evaluation knows as walked along the laboratory's +y."""
 
 
-@dataclass(frozen=True)
-class PublishedForces:
-    """Forces as the published evaluation applies them.
+def published_torques(
+    model: pin.Model, recording: Recording, q: np.ndarray
+) -> tuple[np.ndarray, Trajectory]:
+    """Return generalised forces [N, N m], shape (n, 10), and the forces that they explain.
 
     Args:
-        force: Per side, ground reaction force (forward, up) [N], shape (n, 2).
-        centre: Per side, forward position of the centre of pressure [m], shape (n,).
-        plate: Per side, index of the plate that was picked.
+        model: The published walker (`pinocchio_model(..., published=True)`).
+        recording: The recording.
+        q: Coordinates in every frame; the published torques follow from the published angles with
+            their six printed digits, which forward differences magnify to a few newtons.
     """
+    forces = _forces(recording)
+    v = forward_difference(q, recording.rate)
+    vdot = forward_difference(v, recording.rate)
+    return inverse_dynamics(model, q, v, vdot, forces), forces
 
-    force: dict[Side, np.ndarray]
-    centre: dict[Side, np.ndarray]
-    plate: dict[Side, int]
+
+def forward_difference(values: np.ndarray, rate: float) -> np.ndarray:
+    """Return forward differences per second; the last value is repeated."""
+    differences = np.diff(values, axis=0) * rate
+    return np.concatenate([differences, differences[-1:]])
 
 
-def published_forces(recording: Recording) -> PublishedForces:
+def published_filter(curve: np.ndarray) -> np.ndarray:
+    """Return a mean curve over the gait cycle as the published evaluation smooths it.
+
+    Butterworth, third order, 0.2 of the Nyquist frequency, there and back.
+    """
+    b, a = butter(3, 0.2)
+    return np.asarray(filtfilt(b, a, curve, axis=0))
+
+
+def flagged_cycles(recording: Recording) -> tuple[GaitCycle, ...]:
+    """Return the first gait cycle of each side for which the file holds a ground reaction force.
+
+    Frames are those of the published evaluation.
+    """
+    first: dict[Side, GaitCycle] = {}
+    for cycle in gait_cycles(recording.events):
+        label = f"{cycle.side[0].upper()}GroundReactionForce"
+        if label in recording.markers and cycle.side not in first:
+            start, off, end = (f + EVENT_SHIFT for f in (cycle.start, cycle.toe_off, cycle.end))
+            first[cycle.side] = GaitCycle(cycle.side, start, off, end)
+    return tuple(first.values())
+
+
+def _forces(recording: Recording) -> Trajectory:
     """Return the forces on both feet as the published evaluation has them."""
     plane = WalkingPlane(axis=1, sign=1 if recording.name in TURNED else -1)
     loads = [
         plate_load(plate, _frame_means(plate.channels, recording.samples_per_frame))
         for plate in recording.plates
     ]
-    picked = {side: _pick(recording, [load.force for load in loads], side) for side in SIDES}
-    force, centre = {}, {}
-    for side, index in picked.items():
-        force[side] = plane.project(loads[index].force)
-        centre[side] = plane.project(wrench_axis_at_ground(loads[index]))[:, 0]
-    return PublishedForces(force, centre, picked)
+    feet = {}
+    for side in SIDES:
+        rows = _first_stance(recording, side)
+        load = max(loads, key=lambda load: (load.force[rows] ** 2).sum())
+        centre = plane.project(wrench_axis_at_ground(load))
+        feet[side] = np.column_stack([plane.project(load.force), centre[:, 0]])
+    return force_columns(recording.time, feet)
 
 
 def _frame_means(channels: np.ndarray, per_frame: int) -> np.ndarray:
@@ -82,41 +124,24 @@ def _frame_means(channels: np.ndarray, per_frame: int) -> np.ndarray:
     return means
 
 
-def _pick(recording: Recording, forces: list[np.ndarray], side: str) -> int:
-    """Return the plate with the largest squared force in the first stance of a side."""
-    first, last = _first_stance(recording, side)
-    return int(np.argmax([(force[first : last + 1] ** 2).sum() for force in forces]))
-
-
-def _first_stance(recording: Recording, side: str) -> tuple[int, int]:
-    """Return the published frames of the first strike of a side and of its next toe-off."""
-    events: list[Event] = [event for event in recording.events if event.side == side]
-    strikes = [event.frame + EVENT_SHIFT for event in events if event.kind == "foot_strike"]
+def _first_stance(recording: Recording, side: Side) -> slice:
+    """Return the published frames of the first strike of a side to its next toe-off."""
+    events = [event for event in recording.events if event.side == side]
+    strikes = [event.frame for event in events if event.kind == "foot_strike"]
     for event in events:
-        off = event.frame + EVENT_SHIFT
-        if event.kind == "toe_off" and strikes and off > strikes[0]:
-            return strikes[0], off
+        if event.kind == "toe_off" and strikes and event.frame > strikes[0]:
+            return slice(strikes[0] + EVENT_SHIFT, event.frame + EVENT_SHIFT + 1)
     raise DataError(f"has no stance of the {side} foot", where=recording.name)
 
 
-def forward_difference(values: np.ndarray, rate: float) -> np.ndarray:
-    """Return forward differences per second; the last value is repeated."""
-    differences = np.diff(values, axis=0) * rate
-    return np.concatenate([differences, differences[-1:]])
+def wrench_axis_at_ground(load: PlateLoad) -> np.ndarray:
+    """Return the published evaluation's centre of pressure [m], shape (samples, 3).
 
-
-def published_torques(
-    model: pin.Model, recording: Recording, q: np.ndarray
-) -> tuple[np.ndarray, PublishedForces]:
-    """Return generalised forces [N, N m], shape (n, 10), and the forces that they explain.
-
-    Args:
-        model: The published walker (`pinocchio_model(..., published=True)`).
-        recording: The recording.
-        q: Coordinates in every frame; the published torques follow from the published angles with
-            their six printed digits, which forward differences magnify to a few newtons.
+    It is the point of the wrench's axis that is nearest to the plate's centre, F x M / |F|^2, set
+    down to z = 0; the depth of the sensors is not considered.
     """
-    forces = published_forces(recording)
-    v = forward_difference(q, recording.rate)
-    vdot = forward_difference(v, recording.rate)
-    return inverse_dynamics(model, q, v, vdot, forces.force, forces.centre), forces
+    square = (load.force**2).sum(axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        point = np.cross(load.force, load.moment) / square + load.centre
+    point[:, 2] = 0.0
+    return point

@@ -7,14 +7,14 @@ foot stood across it; the loads themselves have to tell.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from pathwalker_cli.conventions import Side
-from pathwalker_cli.inverse.cycles import Stance, swings
+from pathwalker_cli.inverse.cycles import OTHER, Stance, single_support
 from pathwalker_cli.io.c3d import Event
 
 __all__ = ["LOADED", "Evidence", "StanceForce", "judge", "outside"]
@@ -43,8 +43,6 @@ JUMP: Final = 0.02
 """Distance by which the body's whole weight may seem to jump ahead on a plate when the other foot
 strikes [m]: a second foot 0.4 m ahead shows from a twentieth of the weight on.  In the shipped
 recordings a foot that stands alone gives up to 0.008, two feet give 0.03 and more."""
-
-_OTHER: Final[Mapping[Side, Side]] = {"right": "left", "left": "right"}
 
 
 @dataclass(frozen=True)
@@ -88,51 +86,36 @@ class Evidence:
 
 def judge(stance: Stance, seen: Evidence) -> StanceForce:
     """Return the plate that carried a stance alone, or why there is none."""
-    rows = _single_support(stance, seen.events)
+    rows = single_support(stance, seen.events)
     if not rows.size:
         rows = np.arange(stance.strike, stance.toe_off + 1)
     plate = int(np.argmax(seen.up[rows].sum(axis=0)))
     if seen.up[rows, plate].max() < PRESENT * seen.carried[rows].mean():
         return StanceForce(stance, None, "no plate below the foot")
-    reasons = (check(stance, plate, seen) for check in _CHECKS)
-    return StanceForce(stance, plate, next(filter(None, reasons), ""))
+    return StanceForce(stance, plate, next(_doubts(stance, plate, seen), ""))
 
 
-def outside(points: np.ndarray, extents: np.ndarray) -> np.ndarray:
-    """Return by how much points lie behind the heel or before the toe [m], 0 if between.
-
-    Args:
-        points: Forward positions [m], shape (n,).
-        extents: Forward positions of heel and toe [m], shape (n, 2).
-    """
-    ends = np.sort(extents, axis=1)
-    return np.maximum(0.0, np.maximum(ends[:, 0] - points, points - ends[:, 1]))
-
-
-def _loaded_before_or_after(stance: Stance, plate: int, seen: Evidence) -> str:
-    """Return whether something else stood on the plate when the foot came or went."""
-    load = seen.up[:, plate]
+def _doubts(stance: Stance, plate: int, seen: Evidence) -> Iterator[str]:
+    """Yield what is wrong with a stance on a plate, the plainest first."""
+    name, load = f"plate {plate + 1}", seen.up[:, plate]
     ends = (stance.strike - EDGE, stance.toe_off + EDGE)
-    loaded = any(0 <= end < load.size and load[end] > LOADED for end in ends)
-    return f"plate {plate + 1} loaded before or after the stance" if loaded else ""
-
-
-def _second_foot(stance: Stance, plate: int, seen: Evidence) -> str:
-    """Return whether the other foot struck the plate too, while the standing one was on it."""
-    other = _OTHER[stance.side]
+    if any(0 <= end < load.size and load[end] > LOADED for end in ends):
+        yield f"{name} loaded before or after the stance"
+    other = OTHER[stance.side]
     strikes = [e.frame for e in seen.events if (e.side, e.kind) == (other, "foot_strike")]
     for strike in strikes:
         if stance.strike < strike <= stance.toe_off and _struck(plate, strike, seen):
-            return f"plate {plate + 1} also carries the {other} foot from frame {strike}"
-    return ""
-
-
-def _second_plate(stance: Stance, plate: int, seen: Evidence) -> str:
-    """Return whether the foot struck a further plate too, with the other foot on it or not."""
+            yield f"{name} also carries the {other} foot from frame {strike}"
     for index in range(seen.up.shape[1]):
         if index != plate and _struck(index, stance.strike, seen):
-            return f"plate {index + 1} carries part of the foot from frame {stance.strike}"
-    return ""
+            yield f"plate {index + 1} carries part of the foot from frame {stance.strike}"
+    gap = outside(seen.points[stance.rows, plate], seen.feet[stance.side][stance.rows])
+    if not np.mean(gap[np.isfinite(gap)] < MARGIN) >= INSIDE:
+        yield f"{name}: load not under the foot"
+    single = single_support(stance, seen.events)
+    share = float(load[single].mean() / seen.carried[single].mean()) if single.size else 0.0
+    if not SUPPORT[0] < share < SUPPORT[1]:
+        yield f"{name} carries {share:.0%} of the body in single support"
 
 
 def _struck(plate: int, strike: int, seen: Evidence) -> bool:
@@ -155,38 +138,12 @@ def _struck(plate: int, strike: int, seen: Evidence) -> bool:
     return bool(ahead.max() > JUMP * seen.carried.mean())
 
 
-def _not_under_the_foot(stance: Stance, plate: int, seen: Evidence) -> str:
-    """Return whether the load lies elsewhere than under the foot."""
-    rows = slice(stance.strike, stance.toe_off + 1)
-    gap = outside(seen.points[rows, plate], seen.feet[stance.side][rows])
-    under = np.mean(gap[np.isfinite(gap)] < MARGIN) >= INSIDE
-    return "" if under else f"plate {plate + 1}: load not under the foot"
+def outside(points: np.ndarray, extents: np.ndarray) -> np.ndarray:
+    """Return by how much points lie behind the heel or before the toe [m], 0 if between.
 
-
-def _not_the_body(stance: Stance, plate: int, seen: Evidence) -> str:
-    """Return whether the plate carries less or more than the body in single support."""
-    single = _single_support(stance, seen.events)
-    load, carried = seen.up[single, plate], seen.carried[single]
-    share = float(load.mean() / carried.mean()) if single.size else 0.0
-    if SUPPORT[0] < share < SUPPORT[1]:
-        return ""
-    return f"plate {plate + 1} carries {share:.0%} of the body in single support"
-
-
-def _single_support(stance: Stance, events: tuple[Event, ...]) -> np.ndarray:
-    """Return the frames of a stance in which the other foot is in the air."""
-    frames = np.arange(stance.strike, stance.toe_off + 1)
-    alone = [
-        (frames > off) & (frames < strike) for off, strike in swings(events, _OTHER[stance.side])
-    ]
-    return frames[np.any(alone, axis=0)] if alone else frames[:0]
-
-
-_CHECKS: Final[tuple[Callable[[Stance, int, Evidence], str], ...]] = (
-    _loaded_before_or_after,
-    _second_foot,
-    _second_plate,
-    _not_under_the_foot,
-    _not_the_body,
-)
-"""What may be wrong with a stance on a plate, the plainest first."""
+    Args:
+        points: Forward positions [m], shape (n,).
+        extents: Forward positions of heel and toe [m], shape (n, 2).
+    """
+    ends = np.sort(extents, axis=1)
+    return np.maximum(0.0, np.maximum(ends[:, 0] - points, points - ends[:, 1]))

@@ -12,8 +12,8 @@ from pydantic import Field, field_validator, model_validator
 from pathwalker_cli.config import patient_path, place_of, read_config
 from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.inverse.filters import MOTION_CUTOFF
-from pathwalker_cli.inverse.gaps import LONGEST_GAP
+from pathwalker_cli.inverse.dynamics import MOTION_CUTOFF
+from pathwalker_cli.inverse.markers import LONGEST_GAP
 from pathwalker_cli.io.fields import Quantity, YamlModel, invalid
 
 __all__ = [
@@ -111,11 +111,7 @@ class InverseDynamicsConfig(RecordedConfig):
 def load_inverse_kinematics(
     path: str | Path, changes: tuple[str, ...] = ()
 ) -> InverseKinematicsConfig:
-    """Read the config of an inverse kinematics study.
-
-    Args:
-        path: The YAML file, or the name of a shipped one.
-        changes: Overrides "dotted.key=value".
+    """Read the config of an inverse kinematics study, as `load_inverse_dynamics` does.
 
     Raises:
         ConfigError: If file or overrides are wrong, or no C3D file is named.
@@ -147,8 +143,8 @@ def _load(path: str | Path, changes: tuple[str, ...], model_class: type[Config])
 
     def placed(file: str, key: str) -> str:
         folders = (place_of(key, source, changes), source.parent, Path())
-        found = (folder / file for folder in folders if os.path.exists(folder / file))
-        return str(next(found, file))
+        there = (folder / file for folder in folders if os.path.exists(folder / file))
+        return str(next(there, file))
 
     paths = {
         condition: tuple(placed(file, f"c3d.{condition}") for file in config.c3d.of(condition))

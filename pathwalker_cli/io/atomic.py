@@ -6,6 +6,7 @@ import ctypes
 import os
 import re
 import shutil
+import tempfile
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ __all__ = [
     "check_room",
     "output_path",
     "refuse_special",
+    "staged_folder",
     "swapped",
     "sweep",
     "write_text",
@@ -115,6 +117,42 @@ def atomic_open(path: str | Path, mode: Literal["w", "wb"] = "w") -> Iterator[IO
     text = {"encoding": "utf-8", "newline": ""} if mode == "w" else {}
     with atomic_path(path) as temporary, temporary.open(mode, **text) as file:  # type: ignore[call-overload]
         yield file
+
+
+@contextmanager
+def staged_folder(target: str | Path) -> Iterator[Path]:
+    """Yield an empty folder whose files move into `target` when the block ends without an error.
+
+    After an error nothing is there that was not before.
+
+    Args:
+        target: Where the files shall be; files of the same name are replaced.
+
+    Raises:
+        DataError: If the target is a file or cannot be written.
+    """
+    target = Path(target)
+    above = next(folder for folder in (target, *target.parents) if folder.exists())
+    if not above.is_dir():
+        raise DataError("is a file", where=str(above), mend="choose a folder for the output")
+    if not os.access(above, os.W_OK):
+        raise DataError("cannot be written", where=str(above), mend="choose another folder")
+    beside = target.parent if target.exists() else above
+    if not os.access(beside, os.W_OK):
+        beside = above
+    staging = None
+    try:
+        staging = Path(tempfile.mkdtemp(prefix=f".{target.name}.", suffix=".tmp", dir=beside))
+        yield staging
+        for source in sorted(path for path in staging.rglob("*") if path.is_file()):
+            place = target / source.relative_to(staging)
+            place.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source, place)
+    except OSError as problem:
+        raise DataError(f"cannot be written: {problem.strerror}", where=str(target)) from None
+    finally:
+        if staging is not None:
+            shutil.rmtree(staging, ignore_errors=True)
 
 
 def check_output(path: str | Path) -> None:

@@ -1,6 +1,6 @@
 """C3D recordings in: markers in metres, events, analog channels and force plates.
 
-Positions keep the axes of the laboratory; `inverse.direction` turns them into the walking plane.
+Positions keep the axes of the laboratory; `inverse.markers` turns them into the walking plane.
 """
 
 from __future__ import annotations

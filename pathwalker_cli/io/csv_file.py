@@ -11,7 +11,7 @@ from typing import Any
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open
 
-__all__ = ["number", "read_cells", "read_rows", "write_table"]
+__all__ = ["as_text", "number", "read_cells", "read_rows", "write_table"]
 
 
 def write_table(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
@@ -23,15 +23,25 @@ def write_table(path: str | Path, header: Sequence[str], rows: Iterable[Sequence
             writer.writerow([f"{v:.9g}" if isinstance(v, float) else v for v in row])
 
 
-def read_cells(path: Path, mend: str = "") -> list[list[str]]:
-    """Return the rows of a file that are not empty, its header among them.
+def as_text(value: float | None, digits: int = 6) -> str:
+    """Return a number with that many significant digits, "" for None and NaN."""
+    return "" if value is None or math.isnan(value) else f"{value:.{digits}g}"
+
+
+def read_cells(path: Path, mend: str = "", encoding: str = "utf-8") -> list[list[str]]:
+    """Return the rows of a file, its header among them.
+
+    Args:
+        path: The file.
+        mend: What to do if it cannot be read.
+        encoding: "utf-8-sig" where a byte order mark may stand before the header.
 
     Raises:
         DataError: If it cannot be read.
     """
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            return [row for row in csv.reader(file) if row]
+        with path.open(encoding=encoding, newline="") as file:
+            return list(csv.reader(file))
     except FileNotFoundError:
         raise DataError("no such file", where=str(path), mend=mend) from None
     except (OSError, UnicodeDecodeError, csv.Error) as problem:

@@ -100,13 +100,12 @@ def force_table(forces: Trajectory) -> Trajectory:
     columns: list[np.ndarray] = []
     zero = np.zeros(forces.time.size)
     for side in SIDES:
-        suffix = SUFFIX[side]
-        forward, up = forces[f"force_{suffix}_x"], forces[f"force_{suffix}_z"]
-        point = np.where(up == 0.0, 0.0, forces[f"cop_{suffix}_x"])
-        names += [f"ground_force_{suffix}_v{axis}" for axis in "xyz"]
-        names += [f"ground_force_{suffix}_p{axis}" for axis in "xyz"]
-        names += [f"ground_torque_{suffix}_{axis}" for axis in "xyz"]
-        columns += [forward, up, zero, point, zero, zero, zero, zero, zero]
+        foot = SUFFIX[side]
+        forward, up = forces[f"force_{foot}_x"], forces[f"force_{foot}_z"]
+        for stem in (f"force_{foot}_v", f"force_{foot}_p", f"torque_{foot}_"):
+            names += [f"ground_{stem}{axis}" for axis in "xyz"]
+        point = np.where(up == 0.0, 0.0, forces[f"cop_{foot}_x"])
+        columns += [forward, up, zero, point, *[zero] * 5]
     units = ("N", "N", "N", "m", "m", "m", "N m", "N m", "N m") * 2
     return Trajectory(forces.time, tuple(names), np.column_stack(columns), units)
 

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from pathwalker_cli.conventions import COORDINATES, SUFFIX, Condition, Side, coordinate_unit
+from pathwalker_cli.conventions import (
+    COORDINATES,
+    SIDES,
+    SUFFIX,
+    Condition,
+    Side,
+    coordinate_unit,
+)
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.c3d import LEAST_FRAMES, Event
 from pathwalker_cli.io.csv_file import read_cells, write_table
@@ -18,6 +25,7 @@ from pathwalker_cli.trajectory import Trajectory
 __all__ = [
     "FORCE_COLUMNS",
     "CompactRecording",
+    "foot_columns",
     "names_in",
     "read_compact",
     "read_recording",
@@ -26,12 +34,17 @@ __all__ = [
     "write_recording",
 ]
 
-_BOTH: Final[tuple[Side, Side]] = ("right", "left")
+
+def foot_columns(side: Side) -> tuple[str, str, str]:
+    """Return the columns about one foot: force forward and up, centre of pressure forward."""
+    suffix = SUFFIX[side]
+    return f"force_{suffix}_x", f"force_{suffix}_z", f"cop_{suffix}_x"
+
 
 FORCE_COLUMNS: Final = {
-    f"{stem}_{SUFFIX[side]}_{axis}": unit
-    for side in _BOTH
-    for stem, axis, unit in (("force", "x", "N"), ("force", "z", "N"), ("cop", "x", "m"))
+    name: unit
+    for side in SIDES
+    for name, unit in zip(foot_columns(side), ("N", "N", "m"), strict=True)
 }
 """Columns of a table of ground forces with their units: right foot, then left."""
 
@@ -155,7 +168,7 @@ def _read_events(path: Path, frames: int) -> tuple[Event, ...]:
 def _event(row: list[str], place: str, frames: int) -> Event:
     """Return the event in a row."""
     side, kind, frame = (*row, "", "", "")[:3]
-    if side not in ("right", "left") or kind not in ("foot_strike", "toe_off"):
+    if side not in SIDES or kind not in ("foot_strike", "toe_off"):
         raise DataError(
             f"'{side},{kind}' is no event",
             where=place,

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.io.csv_file import read_cells, write_table
+from pathwalker_cli.io.csv_file import as_text, read_cells, write_table
 from pathwalker_cli.trajectory import Trajectory
 
 __all__ = ["read_trajectory", "write_trajectory"]
@@ -29,7 +29,7 @@ def write_trajectory(path: str | Path, trajectory: Trajectory, digits: int = 6) 
     names = zip(trajectory.names, trajectory.units, strict=True)
     header = ["time [s]", *(f"{name} [{unit}]" for name, unit in names)]
     rows = np.column_stack([trajectory.time, trajectory.values])
-    write_table(path, header, ([_text(value, digits) for value in row] for row in rows))
+    write_table(path, header, ([as_text(value, digits) for value in row] for row in rows))
 
 
 def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
@@ -42,7 +42,7 @@ def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
     Raises:
         DataError: If the file cannot be read; the message names row and column.
     """
-    rows = read_cells(Path(path), "check the path")
+    rows = [row for row in read_cells(Path(path), "check the path", "utf-8-sig") if row]
     if not rows:
         raise DataError("is empty", where=str(path))
     names, units = _header(rows[0], path)
@@ -100,8 +100,3 @@ def _number(cell: str) -> float:
         return float(cell)
     except ValueError:
         return math.nan
-
-
-def _text(value: float, digits: int) -> str:
-    """Return a number as text."""
-    return "" if math.isnan(value) else f"{value:.{digits}g}"

@@ -18,8 +18,8 @@ from pathwalker_cli.evaluation.curves import (
     traces,
 )
 from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_handles
-from pathwalker_cli.inverse.evaluate import StudyTrial
-from pathwalker_cli.inverse.recorded_figures import joint_torque_figure, name_figure
+from pathwalker_cli.inverse.figures import joint_torque_figure, name_figure
+from pathwalker_cli.inverse.trials import Trial
 from pathwalker_cli.patient.blocks import SpringSet
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
@@ -64,9 +64,7 @@ def curve_section(runs: Sequence[ReportRun]) -> Section:
     )  # fmt: skip
 
 
-def torque_drawing(
-    trials: Sequence[StudyTrial], body_mass: float, name: str, title: str
-) -> Drawing:
+def torque_drawing(trials: Sequence[Trial], body_mass: float, name: str, title: str) -> Drawing:
     """Return the recorded joint torques of one condition.
 
     Args:

@@ -9,9 +9,8 @@ from typing import Any, Final
 
 from pathwalker_cli.conventions import CONDITIONS, SIDES, SUFFIX, Condition
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.evaluate import StudyTrial
-from pathwalker_cli.inverse.recorded_read import read_trials
-from pathwalker_cli.inverse.recorded_study import ORIGIN
+from pathwalker_cli.inverse.files import ORIGIN
+from pathwalker_cli.inverse.trials import Trial, read_trials
 from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
@@ -138,10 +137,9 @@ def _torques(
     return [torque_drawing(trials, float(origin["body_mass"]), name, title)]
 
 
-def _measured(trial: StudyTrial) -> bool:
+def _measured(trial: Trial) -> bool:
     """Return whether some complete gait cycle begins with a measured stance."""
-    known = {(s.stance.side, s.stance.strike) for s in trial.stances if s.measured}
-    return trial.tau is not None and any((c.side, c.start) in known for c in trial.cycles)
+    return trial.tau is not None and any(map(trial.measured, trial.cycles))
 
 
 def _strength_table(rows: Rows) -> Table:

@@ -13,7 +13,7 @@ from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX, t
 from pathwalker_cli.evaluation.differences import JOINTS
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperNumber
 from pathwalker_cli.evaluation.recorded import RecordedGait, Spread, recorded_numbers
-from pathwalker_cli.inverse.bands import cycle_band
+from pathwalker_cli.inverse.cycles import cycle_band
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce.results import InverseResult, ProblemResult, Results
 

@@ -14,9 +14,10 @@ from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
 from pathwalker_cli.evaluation.paper import PATIENT
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
-from pathwalker_cli.inverse.evaluate import dynamics_trials
+from pathwalker_cli.inverse.residuals import COMPONENTS, residual_tables
+from pathwalker_cli.inverse.strengths import strength_table
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, load_inverse_dynamics
-from pathwalker_cli.inverse.study_tables import residual_tables, strength_table
+from pathwalker_cli.inverse.trials import dynamics_trials
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.violations import ActiveBound
@@ -42,8 +43,6 @@ METHODS: Final = ("default", "published")
 
 NO_C3D: Final = "not computed: the published method needs the article's C3D files (--c3d)"
 """Why there is no result of the published method."""
-
-_PARTS: Final = ("forward", "up", "moment")
 
 
 @dataclass(frozen=True)
@@ -98,8 +97,8 @@ def inverse_result(config: InverseDynamicsConfig, file: Path) -> tuple[InverseRe
         f"{table.condition}_{part}_{kind}": float(value)
         for table in residual_tables(trials, patient, config)
         if table.part == "whole cycle" and (span := table.range) is not None
-        for kind, values in (("mean", span.mean), ("min", span.lowest), ("max", span.highest))
-        for part, value in zip(_PARTS, values / table.body_mass, strict=True)
+        for kind, values in span.items()
+        for part, value in zip(COMPONENTS, values / table.body_mass, strict=True)
     }
     rows = strength_table(trials, patient, config).rows
     result = InverseResult(

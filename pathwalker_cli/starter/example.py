@@ -16,20 +16,20 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import CubicSpline
 
-from pathwalker_cli.conventions import SIDES, Condition, Side
-from pathwalker_cli.inverse.cycles import Stance, stances
-from pathwalker_cli.inverse.filters import frame_rate
-from pathwalker_cli.inverse.forces import foot_points
+from pathwalker_cli.conventions import SIDES, Condition
+from pathwalker_cli.inverse.cycles import Stance
+from pathwalker_cli.inverse.dynamics import frame_rate
+from pathwalker_cli.inverse.forces import foot_extents, foot_points
 from pathwalker_cli.inverse.kinematics import marker_paths
 from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set, marker_points
-from pathwalker_cli.inverse.plates import plate_channels
+from pathwalker_cli.inverse.trials import recorded_stances
 from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
 from pathwalker_cli.io.c3d_write import write_c3d
 from pathwalker_cli.io.recordings import CompactRecording, read_recording, recording_names
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient, load_patient
 
-__all__ = ["made_recordings", "write_example"]
+__all__ = ["made_recordings", "plate_channels", "write_example"]
 
 SOURCE: Final = "sreenivasa2017-patient"
 """Whose recordings are played."""
@@ -104,14 +104,7 @@ def made_recordings(patient: Patient, condition: Condition) -> Iterator[Recordin
 
 def _measured(trial: CompactRecording) -> list[Stance]:
     """Return the stances of a trial of which the forces are known."""
-    forces = trial.forces
-    if forces is None:
-        return []
-    return [
-        stance
-        for stance in stances(trial.events)
-        if np.isfinite(forces[f"force_{stance.side[0]}_z"][stance.strike : stance.toe_off]).all()
-    ]
+    return [item.stance for item in recorded_stances(trial) if item.measured]
 
 
 @dataclass(frozen=True)
@@ -142,7 +135,8 @@ def _played(trial: CompactRecording, child: _Body, other: _Body) -> _Played:
     count = int((len(values) - 1) * slower) + 1
     frames = np.arange(count) / slower
     q = CubicSpline(np.arange(len(values)), values)(frames)
-    q[:, 1] -= foot_points(child.model, q)[:, :, 1].min(axis=1).mean()
+    soles = np.hstack([points[..., 1] for points in foot_points(child.model, q).values()])
+    q[:, 1] -= soles.min(axis=1).mean()
     events = tuple(
         Event(event.side, event.kind, round(event.frame * slower))
         for event in trial.events
@@ -190,6 +184,29 @@ def _plate(number: int, stance: Stance, played: _Played, child: _Body, other: _B
     return ForcePlate(f"plate {number}", corners, *_SENSORS, samples)
 
 
+def plate_channels(
+    force: np.ndarray, point: np.ndarray, half_length: float, half_width: float, depth: float
+) -> np.ndarray:
+    """Return the channels of a plate that carries a force at a point: `plate_load` turned round.
+
+    Args:
+        force: Force on the body in the plate's axes [N], shape (samples, 3).
+        point: Where it acts on the surface, from the centre along the plate's x and y [m],
+            shape (samples, 2).
+        half_length: Distance of the sensors from the centre along x [m].
+        half_width: Distance of the sensors from the centre along y [m].
+        depth: Depth of the sensors below the surface [m].
+
+    Returns:
+        x12, x34, y14, y23, z1, z2, z3, z4 [N], shape (samples, 8), without moment about z.
+    """
+    fx, fy, fz = force.T
+    x, y = point.T
+    across, along = (y * fz + depth * fy) / half_width, -(x * fz + depth * fx) / half_length
+    corners = [fz + across - along, fz + across + along, fz - across + along, fz - across - along]
+    return np.stack([fx / 2, fx / 2, fy / 2, fy / 2, *(z / 4 for z in corners)], axis=1)
+
+
 def _load(
     stance: Stance, played: _Played, child: _Body, other: _Body
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -202,7 +219,7 @@ def _load(
     assert trial.forces is not None  # noqa: S101 - shipped recordings have forces
     rows = slice(stance.strike, stance.toe_off + 1)
     known = np.arange(stance.strike, stance.toe_off + 1)
-    heel, toe = _foot(other.model, trial.motion.values[rows], side).T
+    heel, toe = foot_extents(other.model, trial.motion.values[rows])[side].T
     centre = trial.forces[f"cop_{side[0]}_x"][rows]
     seen = np.isfinite(centre)
     centre = np.interp(known, known[seen], centre[seen])
@@ -214,12 +231,6 @@ def _load(
         values = np.nan_to_num(trial.forces[f"force_{side[0]}_{name}"][rows])
         force[inside, axis] = np.interp(played.frames[inside], known, values)
     force *= child.mass / other.mass
-    heel, toe = _foot(child.model, played.q, side).T
+    heel, toe = foot_extents(child.model, played.q)[side].T
     share, beyond = (np.interp(played.frames, known, values) for values in (share, beyond))
     return force, heel + share * (toe - heel) + beyond
-
-
-def _foot(model: pin.Model, q: np.ndarray, side: Side) -> np.ndarray:
-    """Return the forward positions of heel and toe [m], shape (n, 2)."""
-    first = 2 * SIDES.index(side)
-    return foot_points(model, q)[:, first : first + 2, 0]

@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import DataError, PatientError
-from pathwalker_cli.inverse.recorded_files import staged_folder
+from pathwalker_cli.io.atomic import staged_folder
 from pathwalker_cli.io.fields import described, field_at
 from pathwalker_cli.io.templates import templates
 from pathwalker_cli.patient import Patient, load_patient

@@ -10,8 +10,10 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from pathwalker_cli.inverse.evaluate import StudyTrial
-from pathwalker_cli.inverse.study_tables import ResidualTable, StrengthTable
+from pathwalker_cli.conventions import SIDES, Side
+from pathwalker_cli.inverse.residuals import COMPONENTS, ResidualTable
+from pathwalker_cli.inverse.strengths import StrengthTable
+from pathwalker_cli.inverse.trials import Trial
 
 __all__ = [
     "dynamics_content",
@@ -23,18 +25,15 @@ __all__ = [
 ]
 
 
-def trials_renderable(trials: Iterable[StudyTrial]) -> Table:
+def trials_renderable(trials: Iterable[Trial]) -> Table:
     """Return one row per trial: length, cycles, measured stances, distance of the markers."""
     trials = tuple(trials)
     fitted = any(trial.markers for trial in trials)
-    table = Table(title="Trials", title_justify="left")
-    for name in ("condition", "trial"):
-        table.add_column(name)
-    for name in ("frames", "strides", "measured stances", *["markers\n[mm]"] * fitted):
-        table.add_column(name, justify="right")
+    heads = ("frames", "strides", "measured stances", *["markers\n[mm]"] * fitted)
+    table = _table("Trials", ("condition", "trial"), heads)
     for trial in trials:
-        seen = [item.stance.side for item in trial.stances if item.measured]
-        counts = [f"{seen.count(side)} {side}" for side in ("right", "left") if side in seen]
+        measured = _measured_sides(trial)
+        counts = [f"{measured.count(side)} {side}" for side in SIDES if side in measured]
         row = [trial.condition, trial.name, str(trial.motion.time.size), str(len(trial.cycles)),
                ", ".join(counts) or "-"]  # fmt: skip
         if fitted:
@@ -44,7 +43,7 @@ def trials_renderable(trials: Iterable[StudyTrial]) -> Table:
 
 
 def dynamics_content(
-    trials: Iterable[StudyTrial], tables: Iterable[ResidualTable], strengths: StrengthTable
+    trials: Iterable[Trial], tables: Iterable[ResidualTable], strengths: StrengthTable
 ) -> dict[str, Any]:
     """Return trials, mean residuals [N, N, N m] and strengths [N m] as plain values."""
     return {
@@ -54,9 +53,7 @@ def dynamics_content(
                 "trial": trial.name,
                 "frames": int(trial.motion.time.size),
                 "strides": len(trial.cycles),
-                "measured_stances": [
-                    item.stance.side for item in trial.stances if item.measured
-                ],
+                "measured_stances": _measured_sides(trial),
             }
             for trial in trials
         ],
@@ -80,49 +77,56 @@ def dynamics_content(
 
 def residuals_renderable(tables: Sequence[ResidualTable]) -> Table:
     """Return mean residuals per trial and over trials, these also per kg of body mass."""
-    table = Table(title="Pelvis residuals, means over frames", title_justify="left")
-    table.add_column("trials and parts of the cycle", no_wrap=True)
-    for name in ("frames", "forward\n[N]", "up\n[N]", "moment\n[N m]"):
-        table.add_column(name, justify="right")
+    heads = (f"{name}\n[{unit}]" for name, unit in COMPONENTS.items())
+    title = "Pelvis residuals, means over frames"
+    table = _table(title, ("trials and parts of the cycle",), ("frames", *heads))
     for block in tables:
         table.add_row(f"{block.condition}, {block.part}", style="bold")
         for item in block.trials:
             table.add_row(f"  {item.trial}", str(item.frames), *_values(item.mean, 2))
-        if block.range is not None:
-            found = block.range
-            spans = {"mean": found.mean, "min": found.lowest, "max": found.highest}
-            for name, values in spans.items():
-                table.add_row(f"  {name} over trials", "", *_values(values, 2), style="bold")
-            for name, values in spans.items():
-                per_kg = _values(values / block.body_mass, 3)
-                table.add_row(f"  {name} per kg of body mass", "", *per_kg, style="dim")
+        spans = block.range.items() if block.range else ()
+        for name, mean in spans:
+            table.add_row(f"  {name} over trials", "", *_values(mean, 2), style="bold")
+        for name, mean in spans:
+            per_kg = _values(mean / block.body_mass, 3)
+            table.add_row(f"  {name} per kg of body mass", "", *per_kg, style="dim")
         table.add_section()
     return table
 
 
-def strengths_renderable(found: StrengthTable) -> RenderableType:
+def strengths_renderable(strengths: StrengthTable) -> RenderableType:
     """Return all strengths beside those of the patient's file, or why there are none."""
-    if not found.rows:
-        return Text(f"No strengths: {found.reason}.")
+    if not strengths.rows:
+        return Text(f"No strengths: {strengths.reason}.")
     title = "Strengths at 90 % activation, beside the patient's file"
-    table = Table(title=title, title_justify="left")
-    table.add_column("generator", no_wrap=True)
-    for name in ("here\n[N m]", "patient\n[N m]", "off by", "stances"):
-        table.add_column(name, justify="right", no_wrap=True)
+    heads = ("here\n[N m]", "patient\n[N m]", "off by", "stances")
+    table = _table(title, ("generator",), heads, no_wrap=True)
     table.add_column("remark")
-    for row in found.rows:
+    for row in strengths.rows:
         table.add_row(
             row.generator,
             f"{row.value:.2f}",
             "-" if row.given is None else f"{row.given:.2f}",
             "-" if row.deviation is None else f"{row.deviation:+.0%}",
-            "" if row.peak is None else str(row.peak.count),
+            "" if row.peak is None else str(len(row.peak.single)),
             row.remark,
         )
     return table
 
 
-def trial_warnings(trials: Iterable[StudyTrial], height: float, share: float) -> tuple[str, ...]:
+def _table(
+    title: str, names: Iterable[str], numbers: Iterable[str], no_wrap: bool = False
+) -> Table:
+    """Return an empty table with columns of names, and of numbers at the right."""
+    table = Table(title=title, title_justify="left")
+    for head in names:
+        table.add_column(head, no_wrap=True)
+    for head in numbers:
+        table.add_column(head, justify="right", no_wrap=no_wrap)
+    return table
+
+
+def trial_warnings(trials: Iterable[Trial], height: float, share: float) -> tuple[str, ...]:
     """Return a sentence for everything about the trials that the user should know.
 
     Args:
@@ -130,28 +134,28 @@ def trial_warnings(trials: Iterable[StudyTrial], height: float, share: float) ->
         height: Height of the patient [m].
         share: Mean distance of the markers that is a warning, as a share of the height.
     """
-    found = []
+    warnings = []
     for trial in trials:
         if trial.markers is not None and trial.markers.mean > share * height:
-            found.append(
+            warnings.append(
                 f"{trial.name}: markers lie {1e3 * trial.markers.mean:.0f} mm from the walker on "
                 f"average (usual: below {1e3 * share * height:.0f} mm at a height of {height:g} "
                 "m): is this the patient's file, and the condition that was recorded?"
             )
         for gap in trial.gaps:
             if not gap.bridged:
-                found.append(
+                warnings.append(
                     f"{trial.name}: marker {gap.marker} is not seen in frames {gap.first} to "
                     f"{gap.first + gap.frames - 1}; the others carry the fit there"
                 )
         if trial.markers is not None and trial.forces is None:
-            found.append(f"{trial.name}: has no force plates, so there are no forces")
+            warnings.append(f"{trial.name}: has no force plates, so there are no forces")
         if not trial.cycles:
-            found.append(f"{trial.name}: shows no complete gait cycle, so it is in no figure")
-    return tuple(found)
+            warnings.append(f"{trial.name}: shows no complete gait cycle, so it is in no figure")
+    return tuple(warnings)
 
 
-def stance_notes(trials: Iterable[StudyTrial]) -> tuple[str, ...]:
+def stance_notes(trials: Iterable[Trial]) -> tuple[str, ...]:
     """Return a sentence for every stance that a plate felt but that is not measured."""
     return tuple(
         f"{trial.name}: {item.stance.side} stance from frame {item.stance.strike} is not measured: "
@@ -160,6 +164,11 @@ def stance_notes(trials: Iterable[StudyTrial]) -> tuple[str, ...]:
         for item in trial.stances
         if not item.measured and item.plate is not None
     )
+
+
+def _measured_sides(trial: Trial) -> list[Side]:
+    """Return the side of each stance with a measured force."""
+    return [item.stance.side for item in trial.stances if item.measured]
 
 
 def _values(mean: np.ndarray, digits: int) -> list[str]:

@@ -1,0 +1,189 @@
+"""Files of recorded gait: per trial CSV, .mot and .sto, tables over trials, `strengths.yaml`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pathwalker_cli.inverse.figures import save_recorded_figures
+from pathwalker_cli.inverse.recorded import strength_lines
+from pathwalker_cli.inverse.residuals import COMPONENTS, ResidualTable
+from pathwalker_cli.inverse.strengths import StrengthTable
+from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.io.csv_file import as_text, write_table
+from pathwalker_cli.io.json_file import write_json
+from pathwalker_cli.io.opensim import force_table, torque_table, write_opensim
+from pathwalker_cli.io.recordings import write_recording
+from pathwalker_cli.io.trajectory_csv import write_trajectory
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient.blocks import Strengths
+from pathwalker_cli.versions import today, versions
+
+__all__ = [
+    "ORIGIN",
+    "strengths_source",
+    "write_dynamics",
+    "write_kinematics",
+    "write_strengths_yaml",
+    "write_trial",
+]
+
+ORIGIN: Final = "study.json"
+"""File that says whose recorded gait was studied, how and when."""
+
+_MARKERS: Final = ("point", "rms [m]", "largest [m]", "frames seen", "frames bridged")
+
+
+def write_kinematics(folder: Path, trials: Sequence[Trial], body_mass: float) -> None:
+    """Write trials and figures below a folder per condition, and the table of marker distances.
+
+    Args:
+        folder: Where; it must exist.
+        trials: The trials.
+        body_mass: Mass of the patient [kg].
+    """
+    for condition in dict.fromkeys(trial.condition for trial in trials):
+        own = [trial for trial in trials if trial.condition == condition]
+        for trial in own:
+            write_trial(folder / condition, trial)
+        save_recorded_figures(own, folder / condition, body_mass)
+    if any(trial.markers for trial in trials):
+        rows = [[t.condition, t.name, *row] for t in trials for row in _marker_rows(t)]
+        write_table(folder / "marker_residuals.csv", ["condition", "trial", *_MARKERS], rows)
+
+
+def write_dynamics(
+    folder: Path,
+    trials: Sequence[Trial],
+    tables: Sequence[ResidualTable],
+    strengths: StrengthTable,
+    patient: Patient,
+    method: str,
+) -> None:
+    """Write what `write_kinematics` writes, residuals, stances, strengths, and whose they are.
+
+    Args:
+        folder: Where; it must exist.
+        trials: The trials.
+        tables: Their residuals.
+        strengths: Strengths, written if there are any.
+        patient: The patient.
+        method: Name of the method.
+    """
+    write_kinematics(folder, trials, patient.body_mass)
+    _write_residuals(folder / "residuals.csv", tables)
+    _write_stances(folder / "stances.csv", trials)
+    if strengths.strengths is not None:
+        _write_strengths(folder / "strengths.csv", strengths)
+        source = strengths_source(method)
+        write_strengths_yaml(folder / "strengths.yaml", strengths.strengths, source)
+    content = {
+        "patient": patient.id,
+        "age": patient.age,
+        "body_mass": patient.body_mass,
+        "height": patient.height,
+        "method": method,
+        "date": today(),
+        "versions": versions(),
+        "notes": list(patient.notes),
+    }
+    write_json(folder / ORIGIN, content)
+
+
+def strengths_source(method: str) -> str:
+    """Return where strengths come from, for the head of their block."""
+    return f"inverse dynamics of recorded barefoot gait, method {method}"
+
+
+def write_trial(folder: Path, trial: Trial) -> None:
+    """Write one trial: angles, events, forces, torques and markers, as far as there are any."""
+    write_recording(folder, trial)
+    stem = str(folder / trial.name)
+    write_opensim(f"{stem}_angles.mot", trial.motion)
+    if trial.forces is not None:
+        write_opensim(f"{stem}_grf.mot", force_table(trial.forces))
+    if trial.tau is not None:
+        write_trajectory(f"{stem}_torques.csv", trial.tau)
+        write_opensim(f"{stem}_torques.sto", torque_table(trial.tau))
+    if trial.markers is not None:
+        write_table(f"{stem}_residuals.csv", _MARKERS, _marker_rows(trial))
+
+
+def _marker_rows(trial: Trial) -> list[list[object]]:
+    """Return one row per marker point of a trial."""
+    if trial.markers is None:
+        return []
+    rows: list[list[object]] = []
+    rms = trial.markers.rms()
+    for name, distances in zip(trial.markers.names, trial.markers.distances.T, strict=True):
+        marker = name.partition(" ")[0]
+        bridged = sum(gap.frames for gap in trial.gaps if gap.marker == marker and gap.bridged)
+        seen = distances[np.isfinite(distances)]
+        largest = seen.max() if seen.size else None
+        rows.append([name, as_text(rms[name]), as_text(largest), seen.size - bridged, bridged])
+    return rows
+
+
+def _write_stances(path: Path, trials: Iterable[Trial]) -> None:
+    """Write which stances are measured, and why the others are not."""
+    rows = [
+        [trial.condition, trial.name, item.stance.side, item.stance.strike, item.stance.toe_off,
+         None if item.plate is None else item.plate + 1, "yes" if item.measured else "no",
+         item.reason]
+        for trial in trials
+        for item in trial.stances
+    ]  # fmt: skip
+    header = ["condition", "trial", "side", "strike [frame]", "toe-off [frame]", "plate",
+              "measured", "reason"]  # fmt: skip
+    write_table(path, header, rows)
+
+
+def _write_residuals(path: Path, tables: Sequence[ResidualTable]) -> None:
+    """Write mean and RMS residuals per trial and mean, min and max of the means over trials."""
+    header = ["condition", "part", "trial", "frames"]
+    for what, per in (("mean", ""), ("rms", ""), ("mean", "/kg")):
+        header += [f"{name} {what} [{unit}{per}]" for name, unit in COMPONENTS.items()]
+    rows: list[list[object]] = []
+    for table in tables:
+        for item in table.trials:
+            values = [*item.mean, *item.rms, *(item.mean / table.body_mass)]
+            row = [item.trial, item.frames, *(as_text(value, 5) for value in values)]
+            rows.append([table.condition, table.part, *row])
+        for name, mean in table.range.items() if table.range else ():
+            values = [*mean, *[None] * len(COMPONENTS), *(mean / table.body_mass)]
+            row = [f"{name} over trials", None, *(as_text(value, 5) for value in values)]
+            rows.append([table.condition, table.part, *row])
+    write_table(path, header, rows)
+
+
+def _write_strengths(path: Path, table: StrengthTable) -> None:
+    """Write all strengths with their origin, the patient's file and what is uncertain."""
+    header = ["generator", "strength [N m]", "patient file [N m]", "deviation [%]", "stances",
+              "peak torque [N m]", "angle [rad]", "speed [rad/s]", "least of single stances [N m]",
+              "largest of single stances [N m]", "remark"]  # fmt: skip
+    rows: list[list[object]] = []
+    for row in table.rows:
+        deviation = "" if row.deviation is None else f"{100.0 * row.deviation:.1f}"
+        origin: list[object] = [None] * 6
+        if (peak := row.peak) is not None:
+            values = (peak.torque, peak.angle, peak.speed, min(peak.single), max(peak.single))
+            origin = [len(peak.single), *(as_text(value, 5) for value in values)]
+        strength = (as_text(row.value, 5), as_text(row.given, 5), deviation)
+        rows.append([row.generator, *strength, *origin, row.remark])
+    write_table(path, header, rows)
+
+
+def write_strengths_yaml(path: Path, strengths: Strengths, source: str) -> None:
+    """Write the block `strengths` as a patient's file takes it.
+
+    Args:
+        path: The file.
+        strengths: Maximum isometric torques [N m].
+        source: Where they come from, one line.
+    """
+    lines = [f"# Maximum isometric torques [N m]: {source}", "strengths:"]
+    lines += strength_lines(strengths)
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
