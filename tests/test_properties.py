@@ -252,7 +252,9 @@ def test_torques_follow_strengths_and_stiffnesses(
     angle, (k_d, k_p) = np.linspace(-0.6, 0.6, 41), np.random.default_rng(seed).uniform(5, 90, 2)
     for side in sides:
         torque = orthosis_torque(side, angle, k_d, k_p)
-        more = orthosis_torque(side.scaled(factor), angle, factor * k_d, factor * k_p)
+        names = ("preload_torque", "dorsiflexion_stop_stiffness", "plantarflexion_stop_stiffness")
+        stiffer = replace(side, **{name: factor * getattr(side, name) for name in names})
+        more = orthosis_torque(stiffer, angle, factor * k_d, factor * k_p)
         close(more, factor * torque, 1e-9)
         assert (torque * (angle - side.neutral_angle) <= 1e-9).all()  # restoring
 

@@ -15,15 +15,6 @@ from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.io.yaml_file import KeyPath, Lines, read_mapping, validate
 from pathwalker_cli.paths import shipped
 
-__all__ = [
-    "config_content",
-    "find_config",
-    "load_config",
-    "patient_path",
-    "place_of",
-    "read_config",
-]
-
 Model = TypeVar("Model", bound=BaseModel)
 
 

@@ -16,16 +16,6 @@ from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.patient.variation import Variation
 from pathwalker_cli.problems import PROBLEMS
 
-__all__ = [
-    "BoundsConfig",
-    "CostConfig",
-    "MeshConfig",
-    "ModelConfig",
-    "SolverConfig",
-    "StartConfig",
-    "StudyConfig",
-]
-
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
 Seconds = Annotated[float, Quantity("s", 0.005, 2.0, above="is it in milliseconds?")]
 Weight = Annotated[float, Quantity("", 0.0, 1e6)]

@@ -12,8 +12,6 @@ from pathwalker_cli.conventions import mirror_permutation
 from pathwalker_cli.gait.costs import Costs, Totals
 from pathwalker_cli.ocp.problem import INFINITY, Boundary, Instant, Rows, Variables
 
-__all__ = ["gait_boundary"]
-
 Groups = tuple[Variables, Variables, Variables]
 
 

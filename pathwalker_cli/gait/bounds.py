@@ -21,8 +21,6 @@ from pathwalker_cli.ocp.problem import INFINITY, BoundTable
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import orthosis_fault
 
-__all__ = ["GaitBounds", "gait_bounds", "held", "recorded_durations", "tracking_bounds"]
-
 Range = tuple[float, float]
 
 

@@ -13,8 +13,6 @@ from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 from pathwalker_cli.ocp.problem import Sample
 
-__all__ = ["cost_terms", "goal_values", "prediction_terms", "walked_distance", "with_goal_costs"]
-
 
 def cost_terms(
     motion: PhasedMotion, costs: Costs, weights: Weights, samples: tuple[Sample, ...] = ()

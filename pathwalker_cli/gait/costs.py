@@ -31,8 +31,6 @@ from pathwalker_cli.gait.choices import (
 )
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 
-__all__ = ["BASE", "GOALS", "CostTerm", "Costs", "Instant", "Totals"]
-
 Weights = Mapping[str, float]
 """Weight of every term by its name; what is missing counts nothing."""
 

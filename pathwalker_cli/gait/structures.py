@@ -18,8 +18,6 @@ from pathwalker_cli.nlp.kernels import kernels
 from pathwalker_cli.nlp.tape_store import Makers, cache_folder, keep_tapes, kept_tapes
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 
-__all__ = ["gait_blocks"]
-
 _MAKERS: Final[Makers] = (
     pin.__version__,
     Path(str(resources.files("pathwalker_cli.model.backends") / "libpinocchio_casadi.so")),

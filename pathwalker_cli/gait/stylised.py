@@ -13,8 +13,6 @@ from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["StylisedGait", "stylised_trajectory"]
-
 
 @dataclass(frozen=True)
 class StylisedGait:

@@ -19,8 +19,6 @@ from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
-__all__ = ["asymmetries", "full_stride", "require_symmetry"]
-
 
 def asymmetries(walker: Walker) -> list[str]:
     """Return in words what differs between the sides of a walker."""

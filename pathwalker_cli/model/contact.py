@@ -12,17 +12,6 @@ from typing import Final, Literal
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.skeleton import SIDES, SUFFIX, Side
 
-__all__ = [
-    "FORCES",
-    "PHASES",
-    "PHASE_NAMES",
-    "POINTS",
-    "ContactForce",
-    "ContactPhase",
-    "ContactPoint",
-    "phase_named",
-]
-
 
 @dataclass(frozen=True)
 class ContactPoint:

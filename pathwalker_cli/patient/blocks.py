@@ -14,24 +14,6 @@ from pydantic import Field, field_validator, model_validator
 from pathwalker_cli.conventions import ANGLES, GENERATORS, SIDES, SUFFIX
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
 
-__all__ = [
-    "AddedMass",
-    "ContactPoints",
-    "FootPoints",
-    "LengthRange",
-    "OrthosisData",
-    "OrthosisFault",
-    "RealSpring",
-    "Recorded",
-    "SegmentLengths",
-    "SpeedRange",
-    "SpringRange",
-    "SpringSet",
-    "Springs",
-    "Strengths",
-    "orthosis_fault",
-]
-
 Length = Annotated[float, Quantity("m", 0.005, 1.0, above="is it in centimetres or millimetres?")]
 Offset = Annotated[
     float, Quantity("m", -0.4, 0.4, "is it in millimetres?", "is it in millimetres?")

@@ -19,8 +19,6 @@ from pathwalker_cli.io.yaml_file import validate
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import SegmentLengths
 
-__all__ = ["Variation", "varied"]
-
 _IDENTITY: Final = frozenset({"id", "description", "sex", "age_for_regressions_reason"})
 """Keys of a patient's file that hold no number."""
 

@@ -12,8 +12,6 @@ import pinocchio as pin
 from pathwalker_cli.errors import BackendError
 from pathwalker_cli.model.backends.topology import Topology, all_parameters
 
-__all__ = ["SIGNATURES", "RigidBodyFunctions", "fold", "parameters_of"]
-
 SIGNATURES = {
     "inverse_dynamics": ("q", "v", "vdot", "theta"),
     "mass_matrix": ("q", "theta"),

@@ -22,17 +22,6 @@ from pathwalker_cli.model.elements import Curve, State, plain
 from pathwalker_cli.model.elements.curves import BezierChain, SignedCurve, newton_steps_for
 from pathwalker_cli.model.numbers import Number
 
-__all__ = [
-    "ACTIVATION_TIME",
-    "DEACTIVATION_TIME",
-    "AndersonCurves",
-    "MuscleTorqueGenerator",
-    "activation_rate",
-    "curves_of",
-    "excitation_from_rate",
-    "generators",
-]
-
 ACTIVATION_TIME: Final = 0.011
 """Activation time constant tau_A [s], Winters and Stark (1988)."""
 DEACTIVATION_TIME: Final = 0.068
