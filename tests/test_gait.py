@@ -42,7 +42,7 @@ def solver() -> GaitSolver:
 def program(solver: GaitSolver) -> CollocationProgram:
     guess, costs = solver.parameter_guess(), len(solver.gait.costs.integrals)
     motion = solver.stride.motion(solver.walker, guess, meshing.uniform([2] * 8), 3, costs)
-    numbers = solver.numbers(solver.weights, solver.bounds.table)
+    numbers = solver.prediction
     return CollocationProgram(solver.blocks, numbers, motion.meshes)
 
 
@@ -62,7 +62,7 @@ def test_frozen_curves_give_the_torques_and_their_derivatives(solver: GaitSolver
     rng = np.random.default_rng(5)
     x = 0.3 * rng.normal(size=block.expressions.unknowns.numel())
     data = np.concatenate([[0.1, 0.5], np.zeros(10)])
-    shared = solver.numbers(solver.weights, solver.bounds.table).shared
+    shared = solver.prediction.shared
     jacobian = np.asarray(ca.DM(jacobian_of(x, data, shared)[0]))
     lam = rng.normal(size=block.rows)
     hessian = np.asarray(ca.DM(hessian_of(x, data, shared, 0.0, lam)))

@@ -354,7 +354,7 @@ def test_barefoot_prediction_agrees_with_collocation() -> None:
     solution = solver.solve(coarse.last_motion)
     assert solution.converged
     motion = solution.last_motion
-    numbers = solver.numbers(solver.weights, solver.bounds.table)
+    numbers = solver.prediction
     shot = solve_shooting(solver.gait, numbers, motion)
     assert shot.converged
     assert shot.violations[0].amount < 1e-6

@@ -42,6 +42,8 @@ SPEED_SPREAD: Final = (1.0, 1.6)
 multiple of the study's own start."""
 
 # Stages of a solve.
+HIGHEST_PELVIS: Final = 2.0
+"""Upper bound of the pelvis' height [m], which no patient reaches."""
 TRACKING: Final = {"tracking": 10.0, "reserve": 10.0, "smoothing": 0.1}
 """Weights of the first stage: follow the stride, carried by reserve forces where needed."""
 TRACKING_TOLERANCE: Final = 1e-2

@@ -20,15 +20,7 @@ from pathwalker_cli.conventions import (
     LEG_JOINTS,
     SUFFIX,
 )
-from pathwalker_cli.gait.choices import (
-    ACCELERATION_SIZE,
-    COMFORT_ROUNDING,
-    FORCE_SIZE,
-    NO_EDGE,
-    PEAK_FLOOR,
-    PEAK_POWER,
-    RATE_SIZE,
-)
+from pathwalker_cli.gait import choices
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 
 Weights = Mapping[str, float]
@@ -161,12 +153,12 @@ BASE: Final[dict[str, CostTerm]] = {
     ),
     "rate": CostTerm(
         "calm controls: squared activation rates per distance (regularisation)",
-        ("rate",), _squares("rate", RATE_SIZE), _of("rate"), "s/m", per_distance=True,
+        ("rate",), _squares("rate", choices.RATE_SIZE), _of("rate"), "s/m", per_distance=True,
         result="rate_regularisation",
     ),
     "acceleration": CostTerm(
         "calm limbs: squared accelerations per distance (regularisation)",
-        ("acceleration",), _squares("vdot", ACCELERATION_SIZE), _of("acceleration"), "s/m",
+        ("acceleration",), _squares("vdot", choices.ACCELERATION_SIZE), _of("acceleration"), "s/m",
         per_distance=True, result="acceleration_regularisation",
     ),
     "tracking": CostTerm(
@@ -175,7 +167,7 @@ BASE: Final[dict[str, CostTerm]] = {
     ),
     "reserve": CostTerm(
         "no help from outside: integral of the squared reserve forces",
-        ("reserve",), _squares("reserve", FORCE_SIZE), _of("reserve"), "s",
+        ("reserve",), _squares("reserve", choices.FORCE_SIZE), _of("reserve"), "s",
     ),
     "smoothing": CostTerm(
         "calm muscles: integrals of squared activations and rates, not per distance",
@@ -223,11 +215,12 @@ def _pressure(point: Instant) -> tuple[Any, ...]:
 
 
 def _peak(point: Instant) -> tuple[Any, ...]:
-    return (sum(a**PEAK_POWER for a in point.activation),)
+    return (sum(a**choices.PEAK_POWER for a in point.activation),)
 
 
 def _peak_value(total: Totals) -> Any:
-    return (total.integrals["peak_activation"] / total.time + PEAK_FLOOR) ** (1.0 / PEAK_POWER)
+    mean = total.integrals["peak_activation"] / total.time
+    return (mean + choices.PEAK_FLOOR) ** (1.0 / choices.PEAK_POWER)
 
 
 def _discomfort(point: Instant) -> tuple[Any, ...]:
@@ -240,7 +233,7 @@ def _discomfort(point: Instant) -> tuple[Any, ...]:
 
 def _beyond(x: Any) -> Any:
     """Return x where it is positive and 0 elsewhere, rounded off."""
-    return 0.5 * (x + (x * x + COMFORT_ROUNDING**2) ** 0.5)
+    return 0.5 * (x + (x * x + choices.COMFORT_ROUNDING**2) ** 0.5)
 
 
 def _mean(name: str) -> Callable[[Totals], Any]:
@@ -328,7 +321,8 @@ class Costs:
         Args:
             weight: Body weight with what is worn [N].
         """
-        ranges = [self.comfort_ranges.get(name, (-NO_EDGE, NO_EDGE)) for name in ANGLES]
+        wide = (-choices.NO_EDGE, choices.NO_EDGE)
+        ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
         known = {"centre_of_pressure": [weight], "discomfort": np.array(ranges).T.ravel()}
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])
 

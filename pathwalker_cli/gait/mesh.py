@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pathwalker_cli.config import MeshConfig
-from pathwalker_cli.gait.choices import AIM, MOST_PARTS
+from pathwalker_cli.gait import choices
 from pathwalker_cli.stride.verify import Reintegration
 
 
@@ -51,8 +51,8 @@ def refined(
         ratio = np.maximum(
             position / config.position_tolerance, velocity / config.velocity_tolerance
         )
-        parts = np.ceil(np.clip(AIM * ratio, 1e-9, 1e6) ** (1.0 / config.degree))
-        parts = np.where(ratio > share, np.clip(parts, 2, MOST_PARTS), 1).astype(int)
+        parts = np.ceil(np.clip(choices.AIM * ratio, 1e-9, 1e6) ** (1.0 / config.degree))
+        parts = np.where(ratio > share, np.clip(parts, 2, choices.MOST_PARTS), 1).astype(int)
         pieces = [
             np.linspace(mesh[i], mesh[i + 1], n + 1)[:-1] for i, n in enumerate(parts.tolist())
         ]

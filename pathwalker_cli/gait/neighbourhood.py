@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pathwalker_cli.gait.choices import DIFFERENCE
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.kkt import Answer, KktSystem
@@ -99,7 +99,7 @@ class Neighbourhood:
         """Return the derivatives by one unknown [its unit] while the others follow."""
         which = self.free.index(unknown)
         held = self.kkt.held(which)
-        step = DIFFERENCE * max(abs(self.optimum.value(unknown)), 0.01 * unknown.scale)
+        step = choices.DIFFERENCE * max(abs(self.optimum.value(unknown)), 0.01 * unknown.scale)
         return self._derivative(held, 1.0 / self._scale[which], step, {})
 
     def by_factor(self, place: str) -> Derivative:
@@ -111,10 +111,10 @@ class Neighbourhood:
         scale = self.optimum.config.variation.scale
         below, above = (
             self._moved({"variation.scale": {**scale, place: scale.get(place, 1.0) * factor}})
-            for factor in (1.0 - DIFFERENCE, 1.0 + DIFFERENCE)
+            for factor in (1.0 - choices.DIFFERENCE, 1.0 + choices.DIFFERENCE)
         )
-        answer = self.kkt.answer(below.program, above.program, DIFFERENCE)
-        return self._derivative(answer, 1.0, DIFFERENCE, {1: above, -1: below})
+        answer = self.kkt.answer(below.program, above.program, choices.DIFFERENCE)
+        return self._derivative(answer, 1.0, choices.DIFFERENCE, {1: above, -1: below})
 
     def changed_activity(self, other: Optimum) -> int:
         """Return how many inequalities are clearly active in one optimum, clearly not in the other.

@@ -17,15 +17,8 @@ import casadi as ca
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.boundary import gait_boundary
-from pathwalker_cli.gait.choices import (
-    ACCELERATION_SIZE,
-    CONTACT_FORCE_SIZE,
-    FORCE_SIZE,
-    HEIGHT_SIZE,
-    RATE_SIZE,
-    VELOCITY_SIZE,
-)
 from pathwalker_cli.gait.costs import Costs, Instant, Weights
 from pathwalker_cli.model.contact import FORCES, PHASES, ContactForce, ContactPhase
 from pathwalker_cli.model.elements import element_forces, generalised_forces
@@ -125,11 +118,11 @@ class GaitProblem:
         self.costs = replace(costs or Costs(), passage=form == "passage")
         self.phases = PHASES[: len(PHASES) // 2] if form == "step" else PHASES
         self.constants = _Constants(walker, self.costs)
-        scale = np.repeat([1.0, VELOCITY_SIZE], len(COORDINATES))
+        scale = np.repeat([1.0, choices.VELOCITY_SIZE], len(COORDINATES))
         self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
         self.q, self.v = ca.vertsplit(self.states.symbol, len(COORDINATES))
         self.activations = Variables.make("a", ACTIVATIONS, 1.0)
-        self.rates = Variables.make("rate", RATES, RATE_SIZE)
+        self.rates = Variables.make("rate", RATES, choices.RATE_SIZE)
         names = tuple(unknown.name for unknown in walker.unknowns)
         sizes = np.array([unknown.scale for unknown in walker.unknowns])
         self.parameters = Variables.make("parameters", names, sizes)
@@ -211,8 +204,8 @@ class GaitProblem:
         body, theta = self.walker.rigid_body, self._theta
         names = ACCELERATIONS + contact.force_names + RESERVES
         counts = [len(ACCELERATIONS), len(contact.forces), len(RESERVES)]
-        scale = np.repeat([ACCELERATION_SIZE, CONTACT_FORCE_SIZE, FORCE_SIZE], counts)
-        z = Variables.make("z", names, scale)
+        sizes = choices.ACCELERATION_SIZE, choices.CONTACT_FORCE_SIZE, choices.FORCE_SIZE
+        z = Variables.make("z", names, np.repeat(sizes, counts))
         vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
         tau, frozen = self._torques
         jacobian = _of(body.point_jacobian(self.q, theta), contact.forces)
@@ -226,8 +219,8 @@ class GaitProblem:
             algebraic=z,
             derivative=ca.vertcat(self.v, vdot),
             residual=Rows.join(
-                Rows.make(balance, equations, FORCE_SIZE),
-                _rows(acceleration, contact.forces, still, FORCE_SIZE),
+                Rows.make(balance, equations, choices.FORCE_SIZE),
+                _rows(acceleration, contact.forces, still, choices.FORCE_SIZE),
             ),
             path=self._path(contact, force, position),
             end=self._touch_down(contact.touched_down(following), position, velocity, acceleration),
@@ -267,7 +260,7 @@ class GaitProblem:
     def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
         """Return heights of the points in the air and the friction cones of the loaded feet."""
         airborne = [f for f in FORCES if f.bears and f.point not in contact.points]
-        rows = [_rows(position, airborne, "{0.point.name} height", HEIGHT_SIZE, INFINITY)]
+        rows = [_rows(position, airborne, "{0.point.name} height", choices.HEIGHT_SIZE, INFINITY)]
         for side in sorted(contact.feet):
             parts = [(f, force[i]) for i, f in enumerate(contact.forces) if f.point.side == side]
             normal = sum(value for f, value in parts if f.bears)
@@ -275,7 +268,7 @@ class GaitProblem:
             cone = self.constants.friction * normal
             value = ca.vertcat(cone - tangent, cone + tangent)
             names = _friction_names(side)
-            rows.append(Rows.make(value, names, CONTACT_FORCE_SIZE, 0.0, INFINITY))
+            rows.append(Rows.make(value, names, choices.CONTACT_FORCE_SIZE, 0.0, INFINITY))
         return Rows.join(*rows)
 
     @staticmethod
@@ -288,9 +281,9 @@ class GaitProblem:
         """
         upward = [f for f in directions if f.bears]
         return Rows.join(
-            _rows(position, upward, "{0.point.name} touch-down", HEIGHT_SIZE),
+            _rows(position, upward, "{0.point.name} touch-down", choices.HEIGHT_SIZE),
             _rows(velocity, directions, "{0.name} touch-down velocity"),
-            _rows(acceleration, directions, "{0.name} touch-down force", FORCE_SIZE),
+            _rows(acceleration, directions, "{0.name} touch-down force", choices.FORCE_SIZE),
         )
 
     @staticmethod
@@ -332,7 +325,7 @@ class GaitProblem:
         position, velocity, _ = self._point_motion(ca.SX.zeros(len(COORDINATES)))
         upward = [f for f in forces if f.bears]
         return Rows.join(
-            _rows(position, upward, "{0.point.name} height at the start", HEIGHT_SIZE),
+            _rows(position, upward, "{0.point.name} height at the start", choices.HEIGHT_SIZE),
             _rows(velocity, forces, "{0.name} velocity at the start"),
         )
 

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from pathwalker_cli.config import StartConfig
 from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.gait.choices import FEWEST_FRAMES, LIFTED, PHASE_SPLITS
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.io.recordings import CompactRecording, read_recording, start_names
 from pathwalker_cli.model.walker import Walker
@@ -76,7 +76,7 @@ def recorded_stride(walker: Walker, recording: CompactRecording) -> ReferenceStr
     gaps = np.roll(np.diff(recording.motion.time[frames]), first)
     toe_off = float(gaps[first:].sum()) if first else 0.0
     closed = _turned(time - time[0], values, distance, period, toe_off)
-    pairs = zip(gaps, PHASE_SPLITS, strict=True)
+    pairs = zip(gaps, choices.PHASE_SPLITS, strict=True)
     durations = np.array([part for gap, s in pairs for part in (gap * s, gap - gap * s)])
     closed[:, _TX] -= closed[0, _TX]
     closed[:, _TZ] -= np.mean([walker.contact_points(q)[:, 1].min() for q in closed])
@@ -168,7 +168,7 @@ def _phase_frames(frames: list[int], heights: np.ndarray, name: str) -> list[int
     height = dict(zip(CONTACT_POINTS, heights.T, strict=True))
 
     def level(point: str, begin: int, end: int) -> float:
-        return float(height[point][begin : end + 1].min()) + LIFTED
+        return float(height[point][begin : end + 1].min()) + choices.LIFTED
 
     def first(mask: np.ndarray, begin: int, otherwise: int) -> int:
         hits = np.flatnonzero(mask[begin:])
@@ -191,7 +191,7 @@ def _phase_frames(frames: list[int], heights: np.ndarray, name: str) -> list[int
         first(height["toe_r"] < toe_r, strike_r, end),
         end,
     ]
-    room = [FEWEST_FRAMES * k for k in range(len(cuts))]
+    room = [choices.FEWEST_FRAMES * k for k in range(len(cuts))]
     spread = np.maximum.accumulate(np.array(cuts) - room) + room
     if spread[-1] > last:
         raise DataError(

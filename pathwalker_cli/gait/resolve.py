@@ -10,15 +10,7 @@ import numpy as np
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.gait.choices import (
-    FAR_START,
-    FURTHER_ROWS,
-    FURTHER_START,
-    NEAR_BOUNDS,
-    NEAR_ROWS,
-    WARM_ITERATIONS,
-    WATCHDOG,
-)
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.numbers import Unknown
@@ -45,7 +37,7 @@ class WarmStart:
 
 
 _NEAR: Final = WarmStart()
-_FURTHER, _FAR = WarmStart(*FURTHER_START), WarmStart(*FAR_START)
+_FURTHER, _FAR = WarmStart(*choices.FURTHER_START), WarmStart(*choices.FAR_START)
 
 
 @dataclass(frozen=True)
@@ -210,8 +202,8 @@ class Resolver:
             lowest = min(solver.refined_barrier, 0.1 * self._tolerance)
             settings = self._solver.settings(self._tolerance, start.barrier or lowest, warm=True)
             pushes = {} if start.push is None else warm_pushes(start.push)
-            extra = {**WATCHDOG, **pushes, **settings.extra}
-            settings = replace(settings, max_iterations=WARM_ITERATIONS, extra=extra)
+            extra = {**choices.WATCHDOG, **pushes, **settings.extra}
+            settings = replace(settings, max_iterations=choices.WARM_ITERATIONS, extra=extra)
             self._warm_solvers[start] = NlpSolver(self._program, settings)
         return self._warm_solvers[start]
 
@@ -228,9 +220,9 @@ def warm_start_for(program: CollocationProgram, start: np.ndarray) -> WarmStart:
     missed = _outside(np.asarray(rows).ravel(), *program.row_bounds)
     rms = float(np.sqrt(np.mean(missed**2)))
     beyond = float(_outside(start, *program.bounds).max())
-    if rms > FURTHER_ROWS:
+    if rms > choices.FURTHER_ROWS:
         return _FAR
-    return _NEAR if rms < NEAR_ROWS and beyond < NEAR_BOUNDS else _FURTHER
+    return _NEAR if rms < choices.NEAR_ROWS and beyond < choices.NEAR_BOUNDS else _FURTHER
 
 
 def _outside(values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:

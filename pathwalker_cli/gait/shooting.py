@@ -14,13 +14,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import GENERATORS
 from pathwalker_cli.errors import ConfigError, InputError
-from pathwalker_cli.gait.choices import (
-    NEXT_PUSH,
-    ROUND_BARRIER_SHARE,
-    SHOOTING_BARRIER,
-    SHOOTING_PUSH,
-    STEP_MARGIN,
-)
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.cost_terms import prediction_terms
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.solution import GaitSolution, StageRecord
@@ -213,7 +207,7 @@ class _Search:
         """Choose steps and solve."""
         settings, number = self.settings, len(self.rounds)
         rounding = settings.roundings[min(number, len(settings.roundings) - 1)]
-        edges = self.shooter.choose(settings.integration_tolerance / STEP_MARGIN)
+        edges = self.shooter.choose(settings.integration_tolerance / choices.STEP_MARGIN)
         meshes = self.nodes.meshes
         self.program = ShootingProgram(self.blocks, self.numbers, meshes, edges, rounding)
         name = f"rounding {rounding:g}"
@@ -233,13 +227,14 @@ class _Search:
         them IPOPT estimates those of the rows by least squares.
         """
         settings, first = self.settings, not self.rounds
-        push = SHOOTING_PUSH if first else NEXT_PUSH
+        push = choices.SHOOTING_PUSH if first else choices.NEXT_PUSH
+        later = choices.ROUND_BARRIER_SHARE * settings.tolerance
         pushes = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
         return IpoptSettings(
             tolerance=settings.tolerance,
             constraint_tolerance=settings.constraint_tolerance,
             max_iterations=settings.max_iterations,
-            initial_barrier=SHOOTING_BARRIER if first else ROUND_BARRIER_SHARE * settings.tolerance,
+            initial_barrier=choices.SHOOTING_BARRIER if first else later,
             extra={
                 "bound_mult_init_method": "mu-based",
                 "constr_mult_init_max": 1e8,
@@ -320,7 +315,7 @@ def _solution(
         last_motion=motion,
         nlp=shooting.nlp,
         cost=shooting.cost,
-        cost_terms=prediction_terms(motion, costs, solver.gait.costs, solver.weights),
+        cost_terms=prediction_terms(motion, costs, solver.gait.costs, solver.config.cost.weights),
         violations=shooting.violations,
         active=active_bounds(shooting.program, shooting.nlp),
         reintegration=errors,

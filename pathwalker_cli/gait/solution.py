@@ -10,8 +10,8 @@ from typing import Any, Final
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.bounds import GaitBounds
-from pathwalker_cli.gait.choices import LEAST_LACK
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion
@@ -211,8 +211,8 @@ class GaitSolution:
 
 def missing_torques(series: GaitSeries) -> tuple[MissingTorque, ...]:
     """Return what the muscles lack in a stride that reserve actuators help along."""
-    largest = sorted(_largest_help(series), key=lambda torque: -torque.torque / torque.strength)
-    return tuple(torque for torque in largest if torque.torque > LEAST_LACK * torque.strength)
+    largest = sorted(_largest_help(series), key=lambda each: -each.torque / each.strength)
+    return tuple(each for each in largest if each.torque > choices.LEAST_LACK * each.strength)
 
 
 def _largest_help(series: GaitSeries) -> Iterator[MissingTorque]:

@@ -11,26 +11,13 @@ import numpy as np
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import MeshConfig, StudyConfig
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
     gait_bounds,
     helped_bounds,
     recorded_durations,
     tracking_bounds,
-)
-from pathwalker_cli.gait.choices import (
-    BARRIER_SHARE,
-    EAGER_ROUND,
-    EAGER_SHARE,
-    FADED,
-    HELPED,
-    LEAST_HELP,
-    MESHING_TOLERANCE,
-    PATIENCE,
-    TRACKING,
-    TRACKING_BARRIER,
-    TRACKING_BARRIER_FACTOR,
-    TRACKING_TOLERANCE,
 )
 from pathwalker_cli.gait.cost_terms import cost_terms, with_goal_costs
 from pathwalker_cli.gait.costs import Weights
@@ -117,11 +104,6 @@ class GaitSolver:
         return "step"
 
     @property
-    def weights(self) -> dict[str, float]:
-        """Weights of the prediction by cost term."""
-        return self.config.cost.weights
-
-    @property
     def free(self) -> tuple[Unknown, ...]:
         """The unknowns that may move within their ranges."""
         ranges = self.bounds.ranges
@@ -134,9 +116,8 @@ class GaitSolver:
         if start.gait == "recorded":
             follow = recorded_passage if self.config.fits else recorded_stride
             return follow(self.walker, start_recording(self.walker, start))
-        return stylised_stride(
-            self.walker, self.start_speed, start.knee_flexion, start.stride_ratio
-        )
+        crouch, ratio = start.knee_flexion, start.stride_ratio
+        return stylised_stride(self.walker, self.start_speed, crouch, ratio)
 
     @property
     def start_speed(self) -> float:
@@ -175,7 +156,7 @@ class GaitSolver:
     @cached_property
     def prediction(self) -> ProblemNumbers:
         """The numbers of the problem itself."""
-        return self.numbers(self.weights, self.bounds.table)
+        return self.numbers(self.config.cost.weights, self.bounds.table)
 
     def stage(
         self,
@@ -246,15 +227,14 @@ class GaitSolver:
     def restored(self, result: NlpResult, meshes: tuple[np.ndarray, ...]) -> GaitSolution:
         """Return the solution that another process found on these meshes."""
         program = CollocationProgram(self.blocks, self.prediction, meshes)
-        errors = self._reintegrated(program.to_motion(result.unknowns))
-        return self._finish(program, result, errors, False)
+        return self._finish(program, result, self._errors(program, result), False)
 
     def _on_first_mesh(self, motion: PhasedMotion, settings: IpoptSettings) -> Stage:
         """Predict on the first mesh; if that fails, by way of a motion that reserves help along."""
         helpless = self.config.fits
-        limit = settings.max_iterations if helpless else min(PATIENCE, settings.max_iterations)
-        settings_here = replace(settings, max_iterations=limit)
-        first = self.stage("first mesh", motion, self.prediction, settings_here)
+        limit = min(choices.PATIENCE, settings.max_iterations)
+        short = settings if helpless else replace(settings, max_iterations=limit)
+        first = self.stage("first mesh", motion, self.prediction, short)
         if first[1].converged or helpless or self._interrupted:
             return first
         return self._helped(motion, settings) or first
@@ -265,7 +245,8 @@ class GaitSolver:
         Returns None if not even reserves lead to a motion within the bounds.
         """
         table = helped_bounds(self.bounds)
-        program, result = self.stage("helped", motion, self.numbers(HELPED, table), settings)
+        numbers = self.numbers(choices.HELPED, table)
+        program, result = self.stage("helped", motion, numbers, settings)
         if not result.converged:
             self.shortfall = None if self._interrupted else Shortfall(within_bounds=False)
             return None
@@ -273,7 +254,7 @@ class GaitSolver:
         last = self.stage("first mesh again", helped, self.prediction, settings)
         if last[1].converged or self._interrupted:
             return last
-        numbers = self.numbers(LEAST_HELP, table)
+        numbers = self.numbers(choices.LEAST_HELP, table)
         program, result = self.stage("least help", helped, numbers, settings)
         if result.converged:
             motion = self.whole_stride(program, result)
@@ -292,15 +273,15 @@ class GaitSolver:
         The orthosis is faded out: its steep stops would fight a stride that ignores it.
         """
         mesh, stride, unknowns = self.config.mesh, self.stride, self.walker.unknowns
-        held = self.parameter_guess() * [FADED if u.faded else 1.0 for u in unknowns]
+        held = self.parameter_guess() * [choices.FADED if u.faded else 1.0 for u in unknowns]
         table = tracking_bounds(self.bounds, stride.durations, self.by_name(held))
         meshes = meshing.first(stride.durations[: len(self.gait.phases)], mesh)
         costs = len(self.gait.costs.integrals)
         motion = stride.motion(self.walker, held, meshes, mesh.degree, costs)
-        settings = self.settings(TRACKING_TOLERANCE, TRACKING_BARRIER)
-        early = {"barrier_tol_factor": TRACKING_BARRIER_FACTOR, **settings.extra}
+        settings = self.settings(choices.TRACKING_TOLERANCE, choices.TRACKING_BARRIER)
+        early = {"barrier_tol_factor": choices.TRACKING_BARRIER_FACTOR, **settings.extra}
         settings = replace(settings, extra=early)
-        numbers = self.numbers(TRACKING, table, FADED)
+        numbers = self.numbers(choices.TRACKING, table, choices.FADED)
         return self.stage("tracking", motion, numbers, settings)
 
     @property
@@ -312,24 +293,24 @@ class GaitSolver:
     ) -> tuple[CollocationProgram, NlpResult, Reintegration]:
         """Refine the mesh until an independent integrator agrees."""
         mesh, solver = self.config.mesh, self.config.solver
-        errors = self._reintegrated(program.to_motion(result.unknowns), MESHING_TOLERANCE)
+        errors = self._errors(program, result, choices.MESHING_TOLERANCE)
         for attempt in range(1, mesh.refinements + 1):
             done = _within(errors, mesh) and tolerance <= solver.tolerance
             if not result.converged or done or self._interrupted:
                 break
-            share = EAGER_SHARE if attempt >= EAGER_ROUND else 1.0
+            share = choices.EAGER_SHARE if attempt >= choices.EAGER_ROUND else 1.0
             meshes = meshing.refined(program.meshes, errors, mesh, share)
             start = program.to_motion(result.unknowns).resampled(meshes, mesh.degree)
             name, before = f"refined {attempt}", (program, result)
             program, result = self._refined(name, start, before, tolerance)
             tolerance = solver.tolerance
-            errors = self._reintegrated(program.to_motion(result.unknowns), MESHING_TOLERANCE)
-        return program, result, self._reintegrated(program.to_motion(result.unknowns))
+            errors = self._errors(program, result, choices.MESHING_TOLERANCE)
+        return program, result, self._errors(program, result)
 
     def _refined(self, name: str, start: PhasedMotion, before: Stage, tolerance: float) -> Stage:
         """Solve on a refined mesh from the last solution; without multipliers if that fails."""
         solver = self.config.solver
-        barrier = max(BARRIER_SHARE * tolerance, solver.refined_barrier)
+        barrier = max(choices.BARRIER_SHARE * tolerance, solver.refined_barrier)
         near = self.settings(solver.tolerance, barrier, warm=True)
         program, result = self.stage(name, start, self.prediction, near, before)
         if result.converged or self._interrupted:
@@ -337,9 +318,12 @@ class GaitSolver:
         far = self.settings(solver.tolerance, solver.warm_barrier)
         return self.stage(f"{name} again", start, self.prediction, far)
 
-    def _reintegrated(self, motion: PhasedMotion, tolerance: float = 1e-9) -> Reintegration:
+    def _errors(
+        self, program: CollocationProgram, result: NlpResult, tolerance: float = 1e-9
+    ) -> Reintegration:
+        """Return the errors of an independent integrator of this relative tolerance."""
         began = time.perf_counter()
-        errors = reintegrate(self.walker, motion, tolerance)
+        errors = reintegrate(self.walker, program.to_motion(result.unknowns), tolerance)
         self.seconds["verify"] += time.perf_counter() - began
         return errors
 
@@ -360,7 +344,7 @@ class GaitSolver:
             nlp=result,
             bounds=self.bounds,
             cost=result.objective,
-            cost_terms=cost_terms(motion, self.gait.costs, self.weights, self.samples),
+            cost_terms=cost_terms(motion, self.gait.costs, self.config.cost.weights, self.samples),
             violations=largest_violations(program, result),
             active=active_bounds(program, result),
             reintegration=errors,

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
-from pathwalker_cli.gait.choices import START_ACTIVATION
+from pathwalker_cli.gait import choices
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times
@@ -81,7 +81,7 @@ class ReferenceStride:
             duration=float(self.durations[i]),
             mesh=mesh,
             states=states(mesh),
-            smooth=np.full((count, len(GENERATORS)), START_ACTIVATION),
+            smooth=np.full((count, len(GENERATORS)), choices.START_ACTIVATION),
             controls=np.zeros((count, len(GENERATORS))),
             integrals=np.zeros((count, integrals)),
             inner_states=states(points),

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.gait.choices import CROUCH_SPREAD, SPEED_SPREAD, STRIDE_SPREAD
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, Shortfall, StageRecord
 from pathwalker_cli.gait.solve import GaitSolver
@@ -42,7 +42,7 @@ def spread_starts(solver: GaitSolver) -> list[Case]:
     single = config.model_copy(update={"starts": 1})
     unknowns = solver.walker.unknowns
     lower, upper = solver.bounds.table.arrays(tuple(unknown.name for unknown in unknowns))
-    spread = (CROUCH_SPREAD, STRIDE_SPREAD, SPEED_SPREAD)
+    spread = (choices.CROUCH_SPREAD, choices.STRIDE_SPREAD, choices.SPEED_SPREAD)
     low = [*(pair[0] for pair in spread), *lower]
     high = [*(pair[1] for pair in spread), *upper]
     cube = qmc.LatinHypercube(len(low), rng=np.random.default_rng(config.start.seed))

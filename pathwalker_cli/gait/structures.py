@@ -47,7 +47,7 @@ def _keep(blocks: CollocationBlocks, key: Hashable) -> None:
     """Keep the tapes of blocks for other processes, if there are tapes and a place for them."""
     if kernels() is None or cache_folder() is None:
         return
-    tapes = {b.name: (b.rows, b.tapes) for b in blocks.blocks if b.matters}
-    known = {name: (rows, found) for name, (rows, found) in tapes.items() if found is not None}
-    if len(known) == len(tapes):
-        keep_tapes(key, known, _MAKERS)
+    derived = [block for block in blocks.blocks if block.matters]
+    tapes = {b.name: (b.rows, b.tapes) for b in derived if b.tapes is not None}
+    if len(tapes) == len(derived):
+        keep_tapes(key, tapes, _MAKERS)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from pathwalker_cli.conventions import COORDINATES, GRAVITY, coordinate_unit
-from pathwalker_cli.gait.choices import SLOWEST
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.trajectory import Trajectory
@@ -59,7 +59,7 @@ def stylised_stride(
     walker: Walker, walking_speed: float, knee_flexion: float, stride_ratio: float
 ) -> ReferenceStride:
     """Return a stylised stride; at least 0.1 sqrt(g leg length) fast."""
-    slowest = SLOWEST * float(np.sqrt(GRAVITY * walker.leg_length))
+    slowest = choices.SLOWEST * float(np.sqrt(GRAVITY * walker.leg_length))
     gait = StylisedGait(max(walking_speed, slowest), stride_ratio * walker.leg_length, knee_flexion)
     return ReferenceStride("synthetic", stylised_trajectory(walker, gait), gait.durations)
 

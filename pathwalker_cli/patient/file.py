@@ -213,7 +213,7 @@ class Patient(YamlModel):
             side: FootPoints(heel=(HEEL_SHARE * foot, sole), toe=(TOE_SHARE * foot, sole))
             for side, foot in feet.items()
         }
-        return Sides[FootPoints](right=points["right"], left=points["left"])
+        return Sides[FootPoints](**points)
 
     @property
     def leg_length(self) -> float:
@@ -229,13 +229,11 @@ class Patient(YamlModel):
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """One sentence for everything that was filled in or overridden."""
-        missing = [
-            n for n in SegmentLengths.model_fields if getattr(self.segment_lengths, n) is None
-        ]
         notes = [
             f"segment length {name}: {default_length(name, self.height):g} m, from body "
             f"proportions ({SOURCE})"
-            for name in missing
+            for name, given in self.segment_lengths
+            if given is None
         ]
         if self.contact_points.barefoot is None:
             notes.append("contact points barefoot: from foot length and height by proportion")
@@ -281,8 +279,8 @@ def load_patient(id_or_path: str | Path, recordings: tuple[Path, ...] = ()) -> P
     path = _patient_file(id_or_path)
     text = read_text(path, PatientError)
     mapping, lines = mapping_in(text, path, PatientError)
-    if isinstance(worn := mapping.get("orthosis"), str):
-        apart = path.parent / worn
+    if isinstance(named := mapping.get("orthosis"), str):
+        apart = path.parent / named
         more = read_text(apart, PatientError)
         content, places = mapping_in(more, apart, PatientError)
         orthosis = validate(
