@@ -316,11 +316,7 @@ class Costs:
         return sum(term.size for term in self.terms.values())
 
     def numbers(self, weight: float) -> np.ndarray:
-        """Return the numbers of all terms, shape (size,).
-
-        Args:
-            weight: Body weight with what is worn [N].
-        """
+        """Return the numbers of all terms for a body weight, orthosis included [N], (size,)."""
         wide = (-choices.NO_EDGE, choices.NO_EDGE)
         ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
         known = {"centre_of_pressure": [weight], "discomfort": np.array(ranges).T.ravel()}
@@ -332,10 +328,10 @@ class Costs:
         numbers: Sequence[Any],
         terms: Mapping[str, CostTerm] | None = None,
     ) -> list[Any]:
-        """Return the running costs at an instant.
+        """Return the running costs at an instant, whose power and data are filled in here.
 
         Args:
-            point: The instant; power and data are filled in here.
+            point: The instant.
             numbers: What `numbers` returns, or symbols for it.
             terms: The terms, if not all.
         """

@@ -69,10 +69,9 @@ class Neighbourhood:
         return np.asarray(self.kkt.parameter_hessian / np.outer(self._scale, self._scale))
 
     def rise(self, changes: Mapping[Unknown, float]) -> float:
-        """Return the rise of the cost to second order if unknowns move while the others follow.
+        """Return the rise of the cost to second order if unknowns move by so much [their unit].
 
-        Args:
-            changes: By how much every moved unknown differs from the optimum [its unit].
+        The others follow.
         """
         moved = [self.free.index(unknown) for unknown in changes]
         rest = [i for i in range(len(self.free)) if i not in moved]
@@ -84,14 +83,7 @@ class Neighbourhood:
         return float(self.cost_gradient[moved] @ step + step @ bend @ step / 2.0)
 
     def curvature(self, unknown: Unknown) -> float:
-        """Return the second derivative of the cost in one unknown while the others follow.
-
-        Args:
-            unknown: One of `free`.
-
-        Returns:
-            The derivative [1/unit^2].
-        """
+        """Return the second derivative of the cost in one of `free`; others follow [1/unit^2]."""
         which = self.free.index(unknown)
         return self.kkt.curvature(which) / float(self._scale[which]) ** 2
 
@@ -105,8 +97,7 @@ class Neighbourhood:
     def by_factor(self, place: str) -> Derivative:
         """Return the derivatives by a factor on a place in the patient's file, the unknowns follow.
 
-        Args:
-            place: The place; what the config scales there already is scaled on.
+        What the config scales there already is scaled on.
         """
         scale = self.optimum.config.variation.scale
         below, above = (
@@ -117,10 +108,9 @@ class Neighbourhood:
         return self._derivative(answer, 1.0, choices.DIFFERENCE, {1: above, -1: below})
 
     def changed_activity(self, other: Optimum) -> int:
-        """Return how many inequalities are clearly active in one optimum, clearly not in the other.
+        """Return how many inequalities are clearly active here, clearly not in another optimum.
 
-        Args:
-            other: An optimum on the same mesh.
+        Both are on the same mesh.
         """
         return self.kkt.changed(other.kkt)
 

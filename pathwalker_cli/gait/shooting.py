@@ -268,10 +268,6 @@ class _Search:
 def solve_by_shooting(solver: GaitSolver, warm_start: PhasedMotion | None = None) -> GaitSolution:
     """Solve by collocation, then by multiple shooting on the same mesh.
 
-    Args:
-        solver: The solver of the study.
-        warm_start: An earlier motion to begin with.
-
     Returns:
         The solution by multiple shooting; that by collocation if it did not converge.
 

@@ -28,12 +28,7 @@ _BUILT: Final[dict[Hashable, CollocationBlocks]] = {}
 
 
 def gait_blocks(gait: GaitProblem, degree: int) -> CollocationBlocks:
-    """Return the collocation blocks of a gait problem.
-
-    Args:
-        gait: The problem.
-        degree: Number of Radau points in an interval.
-    """
+    """Return the collocation blocks of a gait problem with so many Radau points in an interval."""
     key = (gait.structure, degree)
     if key not in _BUILT:
         kept = None if kernels() is None else kept_tapes(key, _MAKERS)

@@ -144,11 +144,6 @@ def segments(
     )
 
 
-def total_mass(parts: tuple[Segment, ...]) -> float:
-    """Return the mass of all segments together [kg]."""
-    return sum(part.mass for part in parts)
-
-
 def _leg(patient: Patient, side: str, added: Mapping[str, float]) -> tuple[Segment, ...]:
     """Return thigh, shank and foot of a side; a device adds mass, and inertia in proportion."""
     suffix = SUFFIX[side]

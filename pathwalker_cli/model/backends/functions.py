@@ -26,12 +26,8 @@ SIGNATURES = {
 
 # Shifting the model, or moving it at a constant velocity, changes none of these.
 _TRANSLATION_INVARIANT = (
-    "inverse_dynamics",
-    "mass_matrix",
-    "bias",
-    "point_accelerations",
-    "point_jacobian",
-)
+    "inverse_dynamics", "mass_matrix", "bias", "point_accelerations", "point_jacobian",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
