@@ -19,7 +19,7 @@ LAYERS = (
     {"errors", "paths"},
     {"nlp"},
     {"ocp"},
-    {"versions", "model.skeleton"},
+    {"versions", "model.choices", "model.skeleton"},
     {"model.contact", "model.numbers"},
     {"conventions"},
     {"trajectory"},

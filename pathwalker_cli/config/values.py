@@ -77,8 +77,8 @@ def differing_values(configs: Sequence[StudyConfig]) -> dict[str, tuple[str, ...
     """Return the keys whose values are not the same in all configs, with all values as text."""
     flat = [_flat(config) for config in configs]
     keys = dict.fromkeys(key for values in flat for key in values)
-    found = {key: tuple(value_text(values.get(key, NO_VALUE)) for values in flat) for key in keys}
-    return {key: values for key, values in found.items() if len(set(values)) > 1}
+    texts = {key: tuple(value_text(values.get(key, NO_VALUE)) for values in flat) for key in keys}
+    return {key: values for key, values in texts.items() if len(set(values)) > 1}
 
 
 def value_text(value: Any) -> str:

@@ -51,7 +51,7 @@ def goal_values(
 
     Args:
         motion: A whole stride.
-        weight: Body weight with what is worn [N].
+        weight: Body weight, orthosis included [N].
         comfort_ranges: Comfortable range by coordinate [rad].
     """
     names = tuple(name for name in GOALS if name != "discomfort" or comfort_ranges)
@@ -63,12 +63,9 @@ def goal_values(
 
 
 def with_goal_costs(motion: PhasedMotion, costs: Costs, weight: float) -> PhasedMotion:
-    """Return a motion whose integrals are those of a problem with these goals.
+    """Return a motion, of a problem with any goals, whose integrals are those of these goals.
 
-    Args:
-        motion: A motion of a problem with these or other goals.
-        costs: The terms of a prediction.
-        weight: Body weight with what is worn [N].
+    `weight` is that of the body, orthosis included [N].
     """
     base = sum(len(term.integrals) for term in BASE.values())
     phases, reached = [], np.zeros(len(costs.integrals) - base)

@@ -13,13 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import (
-    ANGLES,
-    CONTACT_POINTS,
-    COORDINATES,
-    LEG_JOINTS,
-    SUFFIX,
-)
+from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, LEG_JOINTS, SUFFIX
 from pathwalker_cli.gait import choices
 from pathwalker_cli.model.contact import PHASES, ContactPhase
 
@@ -323,10 +317,7 @@ class Costs:
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])
 
     def integrands(
-        self,
-        point: Instant,
-        numbers: Sequence[Any],
-        terms: Mapping[str, CostTerm] | None = None,
+        self, point: Instant, numbers: Sequence[Any], terms: Mapping[str, CostTerm] | None = None
     ) -> list[Any]:
         """Return the running costs at an instant, whose power and data are filled in here.
 

@@ -24,12 +24,9 @@ def first(durations: np.ndarray, config: MeshConfig) -> tuple[np.ndarray, ...]:
 def by_duration(
     durations: np.ndarray, intervals: int, least_per_phase: int
 ) -> tuple[np.ndarray, ...]:
-    """Return a mesh of about equally long intervals.
+    """Return a mesh of so many, about equally long intervals for phases of these durations [s].
 
-    Args:
-        durations: Phase durations [s].
-        intervals: Number of intervals over all phases; short phases may bring in a few more.
-        least_per_phase: Fewest intervals in a phase.
+    Short phases, which get the fewest that are allowed, may bring in a few more.
     """
     shares = intervals * np.asarray(durations) / np.sum(durations)
     return uniform(np.maximum(np.ceil(shares), least_per_phase).astype(int).tolist())

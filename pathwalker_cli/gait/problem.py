@@ -29,14 +29,7 @@ from pathwalker_cli.model.elements.muscle import (
 )
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.frozen import FrozenTerms
-from pathwalker_cli.ocp.problem import (
-    INFINITY,
-    Boundary,
-    MultiPhaseProblem,
-    Phase,
-    Rows,
-    Variables,
-)
+from pathwalker_cli.ocp.problem import INFINITY, Boundary, MultiPhaseProblem, Phase, Rows, Variables
 
 VELOCITIES: Final = tuple(f"{name}_velocity" for name in COORDINATES)
 ACCELERATIONS: Final = tuple(f"{name}_acceleration" for name in COORDINATES)
@@ -336,11 +329,7 @@ def _of(values: ca.SX, forces: Sequence[ContactForce]) -> ca.SX:
 
 
 def _rows(
-    values: ca.SX,
-    forces: Sequence[ContactForce],
-    name: str,
-    scale: float = 1.0,
-    upper: float = 0.0,
+    values: ca.SX, forces: Sequence[ContactForce], name: str, scale: float = 1.0, upper: float = 0.0
 ) -> Rows:
     """Return constraint rows in the directions of some forces; `name` is filled in with each."""
     return Rows.make(_of(values, forces), tuple(name.format(f) for f in forces), scale, 0.0, upper)

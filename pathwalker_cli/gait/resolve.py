@@ -81,7 +81,7 @@ class Optimum:
 
     @property
     def walker(self) -> Walker:
-        """Who walks, with the numbers that were found."""
+        """Who walks, with the numbers of the optimum."""
         return self.solver.walker.with_parameters(self.motion.parameters)
 
     @property

@@ -130,8 +130,7 @@ def gait_shooting(gait: GaitProblem) -> ShootingProblem:
     problem = gait.build()
     if not problem.sample.is_zero():
         raise InputError(
-            "a fit of recorded instants has no multiple-shooting form",
-            mend="use collocation",
+            "a fit of recorded instants has no multiple-shooting form", mend="use collocation"
         )
     controls = Variables.make("e", EXCITATIONS, 1.0)
     return ShootingProblem(problem, controls, rounded_rate, excitation_from_rate)

@@ -20,7 +20,7 @@ from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.verify import Reintegration, second_engine_residual
 
 TOO_WEAK: Final = "the muscles are too weak for a walk within the bounds"
-"""Status of a solve that found which torques are lacking."""
+"""Status of a solve that ended in which torques are lacking."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Shortfall:
     found without them, what is left of them says whether the muscles are too weak.
 
     Args:
-        within_bounds: Whether muscles of any strength can walk within the bounds, as far as found.
+        within_bounds: Whether muscles of any strength can walk within the bounds, as far as known.
         missing: What the muscles lack for it, the largest share of a strength first.
     """
 

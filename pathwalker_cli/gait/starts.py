@@ -65,14 +65,10 @@ def spread_starts(solver: GaitSolver) -> list[Case]:
 
 
 def solve_from_starts(case: Case, finished: Finished | None = None) -> GaitSolution:
-    """Solve a study from all its starts, on as many processes as there are cores.
+    """Return the best solution from all starts of a study, with all local optima by cost.
 
-    Args:
-        case: The study.
-        finished: Called with every local optimum as soon as it is there.
-
-    Returns:
-        The best solution, with all local optima ordered by cost.
+    They run on as many processes as there are cores; `finished` is called with every local optimum
+    as soon as it is there.
     """
     solver = GaitSolver(case)
     outcomes = list(_outcomes(spread_starts(solver), finished))

@@ -10,16 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from pathwalker_cli.errors import ConfigError, did_you_mean
+from pathwalker_cli.model.choices import UNIT_SIZES
 from pathwalker_cli.model.skeleton import SIDES, Side
-
-_SIZES: Final = {"N m/rad": 50.0, "N m": 10.0, "rad": 0.1, "kg": 1.0, "m": 0.1}
-"""What counts as 1 for the solver, by unit; for stiffnesses prototypes needed the fewest
-iterations with this, the others are of the size of the numbers themselves."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,7 @@ class Unknown:
         first, alone = numbers[0], len(numbers) == 1
         label = f"{first.label} {first.side}" if alone and first.side else first.label
         name = first.full_name if alone else first.name
-        return cls(name, label, numbers, _SIZES[first.unit])
+        return cls(name, label, numbers, UNIT_SIZES[first.unit])
 
     @property
     def unit(self) -> str:

@@ -42,7 +42,7 @@ class Walker:
         rigid_body: The same as CasADi functions.
         muscles: The muscle torque generators.
         tissue: Force elements of the body beside the muscles.
-        device: What is worn.
+        device: What the patient walks with.
         values: Every named number by address [SI].
         unknowns: The numbers that a problem is free to choose.
         published: Whether it reproduces the quirks of the published model.
@@ -152,15 +152,9 @@ class Walker:
         return State(*(dict(zip(keys, values, strict=True)) for keys, values in pairs))
 
     def element_forces(self, q: np.ndarray, v: np.ndarray, activation: np.ndarray) -> np.ndarray:
-        """Return the forces of all elements at m instants, by NumPy.
+        """Return the forces of all elements in order at m instants [N m], shape (m, k).
 
-        Args:
-            q: Generalised coordinates [m, rad], shape (m, 10).
-            v: Generalised velocities [m/s, rad/s], shape (m, 10).
-            activation: Activations in [0, 1], shape (m, 14).
-
-        Returns:
-            Forces [N m] in the order of `elements`, shape (m, k).
+        q [m, rad] and v [m/s, rad/s] are of shape (m, 10), activations in [0, 1] of shape (m, 14).
         """
         state = self.state(np.transpose(q), np.transpose(v), np.transpose(activation))
         return np.stack(element_forces(self.elements, state, self.values), axis=-1)
@@ -211,11 +205,12 @@ class Walker:
         q, rest = _vector(q, self.skeleton.size, "q"), np.zeros(self.skeleton.size)
         if not self.device.worn:
             return np.zeros(2)
-        pairs = zip(SIDES, np.broadcast_to(k_d, 2), np.broadcast_to(k_p, 2), strict=True)
+        given = {"dorsiflexion_stiffness": k_d, "plantarflexion_stiffness": k_p}
         springs = {
-            number.address: float(value)
-            for side, *pair in pairs
-            for number, value in zip(self.device.elements[side].numbers[:2], pair, strict=True)
+            number.address: float(np.broadcast_to(given[number.name], 2)[i])
+            for i, element in enumerate(self.device.forces)
+            for number in element.numbers
+            if number.name in given
         }
         forces = self.with_values(springs).element_forces(q, rest, np.zeros(len(self.muscles)))
         return forces[self.columns(self.device.forces)]
@@ -269,12 +264,8 @@ class Walker:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return `contact_dynamics` of m instants: vdot, shape (m, 10), and forces, shape (m, 8).
 
-        Args:
-            phase: The contact phase of all instants.
-            q: Generalised coordinates [m, rad], shape (m, 10).
-            v: Generalised velocities [m/s, rad/s], shape (m, 10).
-            tau: Generalised forces [N, N m], shape (m, 10).
-            terms: What evaluates `dynamics_terms` at m points, if not the function itself.
+        q, v and tau are of shape (m, 10); `terms` evaluates `dynamics_terms` at m points, if not
+        the function itself.
         """
         active = list((phase if isinstance(phase, ContactPhase) else phase_named(phase)).indices)
         count, n, size = len(q), self.skeleton.size, len(active)
@@ -368,7 +359,7 @@ def _numbers(elements: Sequence[ForceElement], device: Device) -> tuple[Number, 
 
 
 def unknowns_of(condition: Condition, free: Sequence[str] = ()) -> tuple[Unknown, ...]:
-    """Return what a problem chooses: what is asked for, and what a device is there to be found for.
+    """Return what a problem chooses: what is asked for, and what a device is identified by.
 
     What a device is identified for stands first, per kind right before left, unless both sides
     alike are asked for.

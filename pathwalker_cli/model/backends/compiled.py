@@ -62,11 +62,7 @@ def library() -> ctypes.CDLL:
 
 
 def check_versions(compiled_against: str) -> None:
-    """Raise a `BackendError` unless the installed Pinocchio and CasADi are these.
-
-    Args:
-        compiled_against: Both versions, separated by a space.
-    """
+    """Raise a `BackendError` unless Pinocchio and CasADi are of these versions, e.g. "3.4 3.7"."""
     installed = f"{pin.__version__} {ca.CasadiMeta.version()}"
     if installed != compiled_against:
         raise BackendError(

@@ -57,18 +57,12 @@ class ForceElement(Protocol):
     ) -> tuple[Any, ...]:
         """Return its generalised force on each of its coordinates [N, N m].
 
-        Args:
-            state: Coordinates, velocities and activations.
-            numbers: Values of its numbers by address.
-            curve: Evaluates functions that are costly to differentiate, see `Curve`.
+        `numbers` are values by address; `curve` evaluates what is costly to differentiate.
         """
 
 
 def element_forces(
-    elements: Iterable[ForceElement],
-    state: State,
-    numbers: Mapping[str, Any],
-    curve: Curve = plain,
+    elements: Iterable[ForceElement], state: State, numbers: Mapping[str, Any], curve: Curve = plain
 ) -> list[Any]:
     """Return the forces of all elements in a row, each on its coordinates in order [N, N m]."""
     return [force for element in elements for force in element.forces(state, numbers, curve)]
