@@ -14,8 +14,13 @@ from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES
 from pathwalker_cli.errors import BackendError
 from pathwalker_cli.model import backends
 from pathwalker_cli.model.backends import bindings, compiled
-from pathwalker_cli.model.backends.functions import SIGNATURES, RigidBodyFunctions, parameters_of
-from pathwalker_cli.model.backends.topology import Topology, all_parameters
+from pathwalker_cli.model.backends.functions import (
+    SIGNATURES,
+    RigidBodyFunctions,
+    Topology,
+    all_parameters,
+    parameters_of,
+)
 
 TOLERANCE = 1e-10
 STATES = 200

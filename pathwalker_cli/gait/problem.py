@@ -11,10 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from functools import cached_property
+from importlib import resources
+from pathlib import Path
 from typing import Final, Literal, cast
 
 import casadi as ca
 import numpy as np
+import pinocchio as pin
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
 from pathwalker_cli.gait import choices
@@ -29,6 +32,9 @@ from pathwalker_cli.model.elements.muscle import (
 )
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.frozen import FrozenTerms
+from pathwalker_cli.nlp.kernels import kernels
+from pathwalker_cli.nlp.tape_store import Makers, cache_folder, keep_tapes, kept_tapes
+from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.problem import INFINITY, Boundary, MultiPhaseProblem, Phase, Rows, Variables
 
 VELOCITIES: Final = tuple(f"{name}_velocity" for name in COORDINATES)
@@ -39,6 +45,14 @@ RATES: Final = tuple(f"{name}_rate" for name in GENERATORS)
 Form = Literal["stride", "step", "passage"]
 """A periodic stride of eight phases, one step of a symmetric gait, or a stride from a recording
 that need not be periodic."""
+
+_MAKERS: Final[Makers] = (
+    pin.__version__,
+    Path(str(resources.files("pathwalker_cli.model.backends") / "libpinocchio_casadi.so")),
+)
+"""What makes the expressions of a gait beside the sources: Pinocchio, and its compiled back end."""
+
+_BUILT: Final[dict[Hashable, CollocationBlocks]] = {}
 
 
 class _Constants:
@@ -338,3 +352,28 @@ def _rows(
 def _friction_names(side: Side) -> tuple[str, str]:
     foot = f"foot_{SUFFIX[side]}"
     return f"{foot} forward friction", f"{foot} backward friction"
+
+
+def gait_blocks(gait: GaitProblem, degree: int) -> CollocationBlocks:
+    """Return the collocation blocks of a gait problem with so many Radau points in an interval.
+
+    All that a patient or a config brings in is a number of the problem: problems of equal structure
+    share their blocks and all derivatives, which are built once in a process.
+    """
+    key = (gait.structure, degree)
+    if key not in _BUILT:
+        kept = None if kernels() is None else kept_tapes(key, _MAKERS)
+        _BUILT[key] = CollocationBlocks(gait.build(), degree, kept)
+        if kept is None:
+            _keep(_BUILT[key], key)
+    return _BUILT[key]
+
+
+def _keep(blocks: CollocationBlocks, key: Hashable) -> None:
+    """Keep the tapes of blocks for other processes, if there are tapes and a place for them."""
+    if kernels() is None or cache_folder() is None:
+        return
+    derived = [block for block in blocks.blocks if block.matters]
+    tapes = {b.name: (b.rows, b.tapes) for b in derived if b.tapes is not None}
+    if len(tapes) == len(derived):
+        keep_tapes(key, tapes, _MAKERS)

@@ -21,7 +21,7 @@ from pathwalker_cli.gait.bounds import (
 )
 from pathwalker_cli.gait.cost_terms import cost_terms, with_goal_costs
 from pathwalker_cli.gait.costs import Weights
-from pathwalker_cli.gait.problem import Form, GaitProblem
+from pathwalker_cli.gait.problem import Form, GaitProblem, gait_blocks
 from pathwalker_cli.gait.recorded import (
     passage_samples,
     recorded_passage,
@@ -36,7 +36,6 @@ from pathwalker_cli.gait.solution import (
     missing_torques,
 )
 from pathwalker_cli.gait.start import ReferenceStride
-from pathwalker_cli.gait.structures import gait_blocks
 from pathwalker_cli.gait.stylised import stylised_stride
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
 from pathwalker_cli.model.numbers import Unknown

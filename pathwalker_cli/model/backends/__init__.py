@@ -18,8 +18,12 @@ import pinocchio as pin
 
 from pathwalker_cli.errors import BackendError
 from pathwalker_cli.model.backends import bindings, compiled, direct
-from pathwalker_cli.model.backends.functions import RigidBodyFunctions, fold
-from pathwalker_cli.model.backends.topology import Topology, all_parameters
+from pathwalker_cli.model.backends.functions import (
+    RigidBodyFunctions,
+    Topology,
+    all_parameters,
+    fold,
+)
 
 _MODULES = MappingProxyType({"pinocchio.casadi": bindings, "compiled": compiled, "direct": direct})
 """Each says by `describe` what would run, or raises what is missing, and has `build`."""

@@ -11,8 +11,12 @@ import numpy as np
 import pinocchio as pin
 
 from pathwalker_cli.errors import BackendError
-from pathwalker_cli.model.backends.functions import SIGNATURES
-from pathwalker_cli.model.backends.topology import JOINT_ENTRIES, POINT_ENTRIES, Topology
+from pathwalker_cli.model.backends.functions import (
+    JOINT_ENTRIES,
+    POINT_ENTRIES,
+    SIGNATURES,
+    Topology,
+)
 
 _PLANE = [0, 2]
 

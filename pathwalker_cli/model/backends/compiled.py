@@ -10,8 +10,7 @@ import casadi as ca
 import pinocchio as pin
 
 from pathwalker_cli.errors import BackendError
-from pathwalker_cli.model.backends.functions import SIGNATURES
-from pathwalker_cli.model.backends.topology import JOINT_TYPES, Topology
+from pathwalker_cli.model.backends.functions import JOINT_TYPES, SIGNATURES, Topology
 
 _LIBRARY = "libpinocchio_casadi.so"
 _REINSTALL = "install pathwalker-cli again, with a C++ compiler at hand"
