@@ -28,7 +28,7 @@ LAYERS = (
     {"patient"},
     {"io.recordings"},
     {"model"},
-    {"problems", "patient.variation", "gait.costs"},
+    {"problems", "patient.variation", "gait.choices", "gait.costs"},
     {"config"},
     {"case"},
     {"stride"},

@@ -229,7 +229,7 @@ def _rows(solver: GaitSolver, content: Mapping[str, Any], seconds: Seconds) -> I
 
 def _weights(solver: GaitSolver) -> dict[str, float]:
     """Return the terms of the objective with their weights; those without any are left out."""
-    weights = solver.weights
+    weights = solver.config.cost.weights
     if not solver.config.fits:
         weights |= {"fit": 0.0, "excitation": 0.0}
     named = {

@@ -18,8 +18,6 @@ from pathwalker_cli.nlp.kernels import kernels
 from pathwalker_cli.nlp.tape_store import Makers, cache_folder, keep_tapes, kept_tapes
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 
-__all__ = ["gait_blocks"]
-
 _MAKERS: Final[Makers] = (
     pin.__version__,
     Path(str(resources.files("pathwalker_cli.model.backends") / "libpinocchio_casadi.so")),
@@ -30,12 +28,7 @@ _BUILT: Final[dict[Hashable, CollocationBlocks]] = {}
 
 
 def gait_blocks(gait: GaitProblem, degree: int) -> CollocationBlocks:
-    """Return the collocation blocks of a gait problem.
-
-    Args:
-        gait: The problem.
-        degree: Number of Radau points in an interval.
-    """
+    """Return the collocation blocks of a gait problem with so many Radau points in an interval."""
     key = (gait.structure, degree)
     if key not in _BUILT:
         kept = None if kernels() is None else kept_tapes(key, _MAKERS)
@@ -49,7 +42,7 @@ def _keep(blocks: CollocationBlocks, key: Hashable) -> None:
     """Keep the tapes of blocks for other processes, if there are tapes and a place for them."""
     if kernels() is None or cache_folder() is None:
         return
-    tapes = {b.name: (b.rows, b.tapes) for b in blocks.blocks if b.matters}
-    known = {name: (rows, found) for name, (rows, found) in tapes.items() if found is not None}
-    if len(known) == len(tapes):
-        keep_tapes(key, known, _MAKERS)
+    derived = [block for block in blocks.blocks if block.matters]
+    tapes = {b.name: (b.rows, b.tapes) for b in derived if b.tapes is not None}
+    if len(tapes) == len(derived):
+        keep_tapes(key, tapes, _MAKERS)

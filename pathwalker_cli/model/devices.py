@@ -11,8 +11,6 @@ from pathwalker_cli.model.elements.orthosis import AnkleOrthosis
 from pathwalker_cli.model.numbers import Number
 from pathwalker_cli.model.skeleton import SIDES, Side
 
-__all__ = ["DEVICES", "Device"]
-
 
 @dataclass(frozen=True)
 class Device:

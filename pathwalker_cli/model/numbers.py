@@ -17,8 +17,6 @@ import numpy as np
 from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.model.skeleton import SIDES, Side
 
-__all__ = ["Number", "Unknown", "unknowns_at", "with_unknowns"]
-
 _SIZES: Final = {"N m/rad": 50.0, "N m": 10.0, "rad": 0.1, "kg": 1.0, "m": 0.1}
 """What counts as 1 for the solver, by unit; for stiffnesses prototypes needed the fewest
 iterations with this, the others are of the size of the numbers themselves."""
@@ -148,23 +146,3 @@ def unknowns_at(addresses: Iterable[str], numbers: Sequence[Number]) -> tuple[Un
         taken.update(unknown.addresses)
         chosen.append(unknown)
     return tuple(chosen)
-
-
-def with_unknowns(
-    values: Mapping[str, float],
-    unknowns: Sequence[Unknown],
-    parameters: Sequence[float] | np.ndarray,
-) -> dict[str, float]:
-    """Return numbers by address with those that unknowns set replaced.
-
-    Args:
-        values: Value by address [SI].
-        unknowns: The unknowns.
-        parameters: Their values in order [SI].
-    """
-    chosen = {
-        address: float(value)
-        for unknown, value in zip(unknowns, parameters, strict=True)
-        for address in unknown.addresses
-    }
-    return {**values, **chosen}

@@ -18,8 +18,8 @@ import numpy as np
 from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.gait.recorded import start_recording
 from pathwalker_cli.gait.solution import GaitSolution
-from pathwalker_cli.gait.start import start_recording
 from pathwalker_cli.inverse.figures import recorded_reference
 from pathwalker_cli.io.atomic import check_room, swapped, sweep
 from pathwalker_cli.io.json_file import read_json, write_json

@@ -11,8 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES, SUFFIX, to_degrees
-from pathwalker_cli.gait.shortfall import Shortfall
-from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
+from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, Shortfall
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import OrthosisData
 from pathwalker_cli.stride.measures import TABLES, expanded, measure_of, measures_in

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from pathwalker_cli.errors import PatientError
-from pathwalker_cli.model.healthy import healthy_child, healthy_strength
 from pathwalker_cli.patient import JENSEN_AGES
+from pathwalker_cli.patient.file import healthy_child, healthy_strength
 
 __all__ = ["AGE", "Child", "made_child"]
 

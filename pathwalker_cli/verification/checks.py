@@ -184,7 +184,9 @@ def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
     made = dict(numbers)
     if run.config.transcription == "collocation":
-        terms = cost_terms(run.motion, solver.gait.costs, solver.weights, solver.samples)
+        terms = cost_terms(
+            run.motion, solver.gait.costs, solver.config.cost.weights, solver.samples
+        )
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
         made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)

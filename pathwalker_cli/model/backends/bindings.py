@@ -14,8 +14,6 @@ from pathwalker_cli.errors import BackendError
 from pathwalker_cli.model.backends.functions import SIGNATURES
 from pathwalker_cli.model.backends.topology import JOINT_ENTRIES, POINT_ENTRIES, Topology
 
-__all__ = ["bindings", "build", "describe", "evaluate"]
-
 _PLANE = [0, 2]
 
 

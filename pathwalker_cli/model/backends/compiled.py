@@ -13,8 +13,6 @@ from pathwalker_cli.errors import BackendError
 from pathwalker_cli.model.backends.functions import SIGNATURES
 from pathwalker_cli.model.backends.topology import JOINT_TYPES, Topology
 
-__all__ = ["build", "describe", "library"]
-
 _LIBRARY = "libpinocchio_casadi.so"
 _REINSTALL = "install pathwalker-cli again, with a C++ compiler at hand"
 

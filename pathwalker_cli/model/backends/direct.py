@@ -14,8 +14,6 @@ import numpy as np
 from pathwalker_cli.model.backends.functions import SIGNATURES
 from pathwalker_cli.model.backends.topology import JOINT_ENTRIES, POINT_ENTRIES, Topology
 
-__all__ = ["build", "describe"]
-
 _PLANE = [0, 2]
 _AXES = ca.SX.eye(3)
 

@@ -12,8 +12,6 @@ import pinocchio as pin
 from pathwalker_cli.errors import BackendError
 from pathwalker_cli.model.backends.topology import Topology, all_parameters
 
-__all__ = ["SIGNATURES", "RigidBodyFunctions", "fold", "parameters_of"]
-
 SIGNATURES = {
     "inverse_dynamics": ("q", "v", "vdot", "theta"),
     "mass_matrix": ("q", "theta"),
@@ -28,12 +26,8 @@ SIGNATURES = {
 
 # Shifting the model, or moving it at a constant velocity, changes none of these.
 _TRANSLATION_INVARIANT = (
-    "inverse_dynamics",
-    "mass_matrix",
-    "bias",
-    "point_accelerations",
-    "point_jacobian",
-)
+    "inverse_dynamics", "mass_matrix", "bias", "point_accelerations", "point_jacobian",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

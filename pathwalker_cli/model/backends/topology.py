@@ -14,8 +14,6 @@ import pinocchio as pin
 
 from pathwalker_cli.errors import BackendError
 
-__all__ = ["JOINT_ENTRIES", "JOINT_TYPES", "POINT_ENTRIES", "Topology", "all_parameters"]
-
 JOINT_TYPES = ("RX", "RY", "RZ", "PX", "PY", "PZ")
 """Supported joints: revolute about and prismatic along the axes of the joint frame."""
 

@@ -12,8 +12,6 @@ from typing import Any, Protocol
 
 from pathwalker_cli.model.numbers import Number
 
-__all__ = ["ForceElement", "State", "element_forces", "generalised_forces", "plain"]
-
 Curve = Callable[..., Any]
 """Evaluates a scalar function at its arguments, e.g. `plain`, or by a stand-in whose derivatives
 cost less."""

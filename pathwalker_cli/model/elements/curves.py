@@ -17,8 +17,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-__all__ = ["BezierChain", "BezierPoint", "SignedCurve", "evaluate", "newton_steps_for"]
-
 _MOST_NEWTON_STEPS = 9
 """Enough for 1e-14 on every corner in use; the flattest are the eccentric velocity curves."""
 

@@ -7,7 +7,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 
@@ -15,8 +15,6 @@ from pathwalker_cli.model.elements import Curve, State, plain
 from pathwalker_cli.model.elements.curves import BezierChain, evaluate
 from pathwalker_cli.model.numbers import Number
 from pathwalker_cli.model.skeleton import SUFFIX, Side
-
-__all__ = ["AnkleOrthosis", "OrthosisSide", "orthosis_curve", "orthosis_torque"]
 
 _CURVINESS: Final = 0.7
 _BLEND: Final = 0.1
@@ -50,11 +48,6 @@ class OrthosisSide:
     plantarflexion_stop: Any
     dorsiflexion_stop_stiffness: Any
     plantarflexion_stop_stiffness: Any
-
-    def scaled(self, share: float) -> OrthosisSide:
-        """Return an orthosis whose preload and stops carry a share of the torque."""
-        names = ("preload_torque", "dorsiflexion_stop_stiffness", "plantarflexion_stop_stiffness")
-        return replace(self, **{name: share * getattr(self, name) for name in names})
 
 
 def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:
@@ -150,19 +143,11 @@ _NUMBERS: Final = (
     ("preload_torque", "preload_torque", "preload", "N m"),
     ("dorsiflexion_stop", "dorsiflexion_stop", "dorsiflexion stop", "rad"),
     ("plantarflexion_stop", "plantarflexion_stop", "plantarflexion stop", "rad"),
-    (
-        "stop_stiffness.dorsiflexion",
-        "dorsiflexion_stop_stiffness",
-        "dorsiflexion stop stiffness",
-        "N m/rad",
-    ),
-    (
-        "stop_stiffness.plantarflexion",
-        "plantarflexion_stop_stiffness",
-        "plantarflexion stop stiffness",
-        "N m/rad",
-    ),
-)
+    ("stop_stiffness.dorsiflexion", "dorsiflexion_stop_stiffness",
+     "dorsiflexion stop stiffness", "N m/rad"),
+    ("stop_stiffness.plantarflexion", "plantarflexion_stop_stiffness",
+     "plantarflexion stop stiffness", "N m/rad"),
+)  # fmt: skip
 """Place below `orthosis` in the patient's file, name, label and unit of every number: both springs,
 then the fields of `OrthosisSide`."""
 
