@@ -23,12 +23,8 @@ from pathwalker_cli.io.fields import described, field_at, is_model
 from pathwalker_cli.patient import OrthosisData, Patient
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.starter.files import explained_keys
+from pathwalker_cli.studies import STUDIES as AROUND
 from pathwalker_cli.studies.batch.schema import BatchStudy
-from pathwalker_cli.studies.landscape.study import LandscapeStudy
-from pathwalker_cli.studies.perturbation.study import PerturbationStudy
-from pathwalker_cli.studies.sensitivity.study import SensitivityStudy
-from pathwalker_cli.studies.tradeoff.study import TradeoffStudy
-from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy
 
 PAGE: Final = Path(__file__).with_name("configuration.md")
 CONFIGS: Final = PAGE.parent.parent / "configs"
@@ -36,11 +32,7 @@ CONFIGS: Final = PAGE.parent.parent / "configs"
 STUDIES: Final[tuple[tuple[str, str, type[BaseModel]], ...]] = (
     ("Predictions", "mapd-orthosis.yaml", StudyConfig),
     ("Many cases", "cohort.yaml", BatchStudy),
-    ("Softer and stiffer springs", "perturbation.yaml", PerturbationStudy),
-    ("Uncertain numbers of the patient", "uncertainty.yaml", UncertaintyStudy),
-    ("Cost over the springs", "landscape.yaml", LandscapeStudy),
-    ("Effort against speed", "tradeoff.yaml", TradeoffStudy),
-    ("What one percent changes", "sensitivity.yaml", SensitivityStudy),
+    *((e.heading, f"{e.name}.yaml", e.load().model) for e in AROUND.values()),
     ("Recorded gait: angles", "inverse-kinematics.yaml", InverseKinematicsConfig),
     ("Recorded gait: torques and strengths", "inverse-dynamics.yaml", InverseDynamicsConfig),
     ("Recorded gait: markers", "markers.yaml", MarkerSet),

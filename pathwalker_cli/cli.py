@@ -16,6 +16,7 @@ from pathwalker_cli import __version__
 from pathwalker_cli.commands.examples import examples_epilog
 from pathwalker_cli.commands.options import print_failure
 from pathwalker_cli.errors import NotConvergedError, PathwalkerError
+from pathwalker_cli.studies import STUDIES
 
 __all__ = ["COMMANDS", "GROUPS", "NOT_CONVERGED", "REFUSED", "STOPPED", "cli", "main"]
 
@@ -29,15 +30,7 @@ STOPPED: Final = 130
 
 COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "solve": ("solve", "Predict the gait of a patient by optimal control."),
-    "perturb": ("studies", "Move every orthosis spring a little and see what changes."),
-    "sensitivity": (
-        "studies",
-        "Tell what one percent of every number of patient and orthosis changes.",
-    ),
-    "uncertainty": (
-        "studies",
-        "Draw the uncertain numbers of a patient and see how far the answers spread.",
-    ),
+    **{name: ("studies", entry.title) for name, entry in STUDIES.items()},
     "evaluate": ("compare", "Compare predicted gait with the recordings of the patient."),
     "verify": ("verify", "Check run folders: files, equations of motion, balances, optimality."),
     "rerun": ("verify", "Solve a run again from its folder alone and tell how the two differ."),
@@ -51,8 +44,6 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
         "batch",
         "Solve every case of a study: patients, problems and overrides in any number.",
     ),
-    "landscape": ("studies", "Map the cost over the spring stiffnesses of a side."),
-    "tradeoff": ("studies", "Find what walking faster costs, and which springs suit which speed."),
     "animate": (
         "pages",
         "Draw the walker of one or two runs, moving: a page for the browser, a GIF or an MP4.",
@@ -81,7 +72,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
 
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Predict": ("solve", "batch", "reproduce"),
-    "Springs and certainty": ("perturb", "sensitivity", "uncertainty", "landscape", "tradeoff"),
+    "Springs and certainty": tuple(STUDIES),
     "Recorded gait": ("import", "ik", "id"),
     "Look and compare": ("report", "animate", "view", "compare", "evaluate", "model"),
     "Prove": ("verify", "rerun"),
@@ -107,7 +98,11 @@ class _LazyGroup(click.Group):
         if cmd_name not in COMMANDS:
             return None
         module = import_module(f"pathwalker_cli.commands.{COMMANDS[cmd_name][0]}")
-        command: click.Command = getattr(module, f"{cmd_name}_command")
+        command: click.Command = (
+            module.study_command(cmd_name)
+            if cmd_name in STUDIES
+            else getattr(module, f"{cmd_name}_command")
+        )
         command.epilog = examples_epilog(cmd_name)
         return command
 

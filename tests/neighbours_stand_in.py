@@ -44,7 +44,9 @@ class StandInOptimum:
     @property
     def solver(self) -> Any:
         walker = build_walker(self.case.patient, "orthosis", backend="direct")
-        return SimpleNamespace(walker=walker, bounds=gait_bounds(walker, self.config.bounds))
+        bounds = gait_bounds(walker, self.config.bounds)
+        free = tuple(u for u in walker.unknowns if len(set(bounds.ranges[u.name])) > 1)
+        return SimpleNamespace(walker=walker, bounds=bounds, free=free)
 
     @property
     def motion(self) -> Any:

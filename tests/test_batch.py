@@ -34,15 +34,12 @@ from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
-from pathwalker_cli.studies.batch import ledger, local
+from pathwalker_cli.studies.batch import ledger, worker
 from pathwalker_cli.studies.batch.cases import BatchCase, load_cases
-from pathwalker_cli.studies.batch.local import LocalPool
-from pathwalker_cli.studies.batch.names import case_name, short_keys, slug
-from pathwalker_cli.studies.batch.study import Watch, run_batch
-from pathwalker_cli.studies.batch.table import CaseTable
-from pathwalker_cli.studies.batch.text import report_text
-from pathwalker_cli.studies.batch.units import unit_of
-from pathwalker_cli.studies.batch.worker import LOST, Task, Work, failure, solve_case
+from pathwalker_cli.studies.batch.ledger import CaseTable, unit_of
+from pathwalker_cli.studies.batch.schema import case_name, short_keys, slug
+from pathwalker_cli.studies.batch.study import Watch, report_text, run_batch
+from pathwalker_cli.studies.batch.worker import LOST, LocalPool, Task, Work, failure, solve_case
 from pathwalker_cli.studies.batch.worker import Result as Ending
 
 PATIENT = "sreenivasa2017-patient"
@@ -495,7 +492,7 @@ def test_workers_that_cannot_begin_fail_every_case(
     tasks = [Task(str(i), case, str(tmp_path)) for i in range(9)]
     results = dict(LocalPool(4).run(tasks, fake_work))
     assert {result["reason"] for result in results.values()} == {LOST}
-    assert {result["detail"] for result in results.values()} == {local.NO_WORKERS}
+    assert {result["detail"] for result in results.values()} == {worker.NO_WORKERS}
     assert len(results) == 9
 
 
@@ -648,7 +645,7 @@ from pathlib import Path
 from fake_work import die, fake_work
 from pathwalker_cli.case import load_case
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.studies.batch.local import LocalPool
+from pathwalker_cli.studies.batch.worker import LocalPool
 from pathwalker_cli.studies.batch.worker import Task
 
 def work():
@@ -715,7 +712,7 @@ def awaited(condition: Callable[[], Any], seconds: float = GUARD) -> Any:
 @pytest.fixture
 def fakes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the command work without solves."""
-    monkeypatch.setattr(local, "LocalPool", lambda *_: Serial(fake_work))
+    monkeypatch.setattr(worker, "LocalPool", lambda *_: Serial(fake_work))
 
 
 @pytest.mark.usefixtures("fakes")

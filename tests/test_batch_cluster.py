@@ -21,9 +21,8 @@ from pathwalker_cli.case import load_case
 from pathwalker_cli.errors import BackendError, ConfigError
 from pathwalker_cli.studies.batch import cluster as module
 from pathwalker_cli.studies.batch.cluster import DaskPool, connected, slurm_jobs
-from pathwalker_cli.studies.batch.local import LocalPool
 from pathwalker_cli.studies.batch.study import Watch, run_batch
-from pathwalker_cli.studies.batch.worker import Task
+from pathwalker_cli.studies.batch.worker import LocalPool, Task
 from test_batch import awaited, kinds, table_of
 
 

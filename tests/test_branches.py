@@ -10,8 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pathwalker_cli.studies.branches import explore
-from pathwalker_cli.studies.graph import Exploration, Graph, Rules, Values
+from pathwalker_cli.studies.branches import Exploration, Graph, Rules, Values, explore
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ RULES: Rules[End] = Rules(lambda a, b: abs(a.x - b.x), lambda end: np.array([end
 
 def basins(found: Exploration[End]) -> Iterator[int]:
     for branches in found.branches.values():
-        yield int(branches[0].found.x >= 0.5)
+        yield int(branches[0].end.x >= 0.5)
 
 
 def test_points_are_solved_outwards_from_the_nearest() -> None:
@@ -90,7 +89,7 @@ def test_a_better_branch_found_at_the_far_end_comes_back_as_far_as_it_is_better(
     assert found.complete
     both = [point for point, branches in found.branches.items() if len(branches) == 2]
     assert both == ["t4", "t5", "t6", "t7"], "t4 learns of the other branch and does not hand it on"
-    assert found.branches["t6"][0].found.cost < found.branches["t6"][1].found.cost
+    assert found.branches["t6"][0].end.cost < found.branches["t6"][1].end.cost
 
 
 def test_without_sweeps_the_first_way_decides() -> None:
@@ -123,7 +122,7 @@ def test_steps_that_fail_are_halved() -> None:
     found = explore(line(2), toy.root(0, 0.0), toy.solve, RULES)
     assert toy.names == ["t1.from.t0-0", "t1.from.t0-0.0-0.5", "t1.from.t0-0.0.5-1"]
     assert len(found.branches["t1"]) == 1
-    assert sum(not attempt.found.converged for attempt in found.attempts) == 1
+    assert sum(not attempt.end.converged for attempt in found.attempts) == 1
 
 
 def test_points_that_cannot_be_reached_stay_without_a_solution() -> None:
@@ -150,7 +149,7 @@ def test_a_plane_is_filled_from_the_corner_of_the_other_basin() -> None:
     toy = Toy(fold=8.0)
     found = explore(Graph(points, tuple(edges), "0-0"), toy.root(0, 0.0), toy.solve, RULES)
     for name, values in points.items():
-        assert found.branches[name][0].found.cost == min(10.0 + sum(values), 19.0 - sum(values))
+        assert found.branches[name][0].end.cost == min(10.0 + sum(values), 19.0 - sum(values))
 
 
 def test_a_better_end_of_the_same_optimum_takes_its_place() -> None:
@@ -163,7 +162,7 @@ def test_a_better_end_of_the_same_optimum_takes_its_place() -> None:
     )  # fmt: skip
     best = found.best("b")
     assert best is not None
-    assert (best.found.cost, best.number, best.times) == (10.0, 0, 3)
+    assert (best.end.cost, best.number, best.times) == (10.0, 0, 3)
 
 
 @pytest.mark.parametrize(

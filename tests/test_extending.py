@@ -73,7 +73,7 @@ def run(folder: Path, *words: str) -> str:
 
 def test_every_addition_takes_one_or_two_files() -> None:
     sections = PAGE.read_text(encoding="utf-8").split("\n## ")[2:-1]
-    assert len(sections) == 4
+    assert len(sections) == 5
     for section in sections:
         files = {file for _, _, file in blocks(section) if file}
         assert len(files) <= 2, section.splitlines()[0]
@@ -89,3 +89,15 @@ def test_check_tells_of_it(copy: Path) -> None:
     )
     for label in ("knee_tissue_stiffness: [1, 10] N m/rad", "neutral_angle: [-0.05, 0.03] rad"):
         assert label in " ".join(output.split())
+
+
+def test_the_study_of_the_page_is_a_command(copy: Path) -> None:
+    start = "from pathwalker_cli.cli import main; main()"
+    assert "at a few least speeds" in run(copy, "-c", start, "speeds", "--help")
+    (copy / "speeds.yaml").write_text("base: mapd-barefoot\nleast_speeds: [0.7, 0.8]\n")
+    assert "2 least speeds" in run(copy, "-c", start, "check", "speeds.yaml")
+
+
+def test_the_study_of_the_page_is_the_one_that_other_tests_run() -> None:
+    code = (Path(__file__).parent / "speeds_study.py").read_text(encoding="utf-8")
+    assert code in PAGE.read_text(encoding="utf-8")

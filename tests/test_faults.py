@@ -107,7 +107,9 @@ def test_a_write_of_a_run_killed_at_any_step_leaves_the_old_run_or_the_new_one(
     run, seen = tmp_path / "runs" / "run", set()
     solution = made_solution(cost=0.9)
     metrics = run_folder.run_metrics(solution, run_inputs(solution.case))
-    monkeypatch.setattr(run_folder, "run_metrics", lambda made, _: {**metrics, "cost": made.cost})
+    monkeypatch.setattr(
+        run_folder, "run_metrics", lambda made, *_: metrics.model_copy(update={"cost": made.cost})
+    )
     monkeypatch.setattr(run_folder, "TABLES", dict.fromkeys(run_folder.TABLES, small_table))
     if exchange == "in two steps":
         monkeypatch.setattr(run_folder, "swapped", lambda *_: False)

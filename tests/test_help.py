@@ -36,7 +36,7 @@ from pathwalker_cli.results import run_folder
 from pathwalker_cli.studies import run as study_run
 from pathwalker_cli.studies.batch import cases, study
 from pathwalker_cli.studies.batch.ledger import Ended
-from pathwalker_cli.studies.batch.text import report_content
+from pathwalker_cli.studies.batch.study import report_content
 
 JSON = ("solve", "perturb", "sensitivity", "uncertainty", "landscape", "tradeoff", "batch", "id",
         "doctor", "check", "evaluate")  # fmt: skip

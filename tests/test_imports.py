@@ -76,7 +76,7 @@ CONFINED = {
     "dask_jobqueue": ("studies.batch.cluster",),
     "distributed": ("studies.batch.cluster",),
     "ezc3d": ("io",),
-    "pebble": ("io.processes", "studies.batch.local"),
+    "pebble": ("io.processes", "studies.batch.worker"),
     "yaml": ("io",),
 }
 """Libraries and the parts of the package that may import them."""

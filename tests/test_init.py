@@ -34,11 +34,11 @@ from pathwalker_cli.starter.child import made_child
 from pathwalker_cli.starter.configs import WIDTH
 from pathwalker_cli.starter.files import explained_keys, folder_files, next_steps
 from pathwalker_cli.studies.base import load_study
-from pathwalker_cli.studies.landscape.study import LandscapeStudy
-from pathwalker_cli.studies.perturbation.study import PerturbationStudy
-from pathwalker_cli.studies.sensitivity.study import SensitivityStudy
-from pathwalker_cli.studies.tradeoff.study import TradeoffStudy
-from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy
+from pathwalker_cli.studies.landscape import LandscapeStudy
+from pathwalker_cli.studies.perturbation import PerturbationStudy
+from pathwalker_cli.studies.sensitivity import SensitivityStudy
+from pathwalker_cli.studies.tradeoff import TradeoffStudy
+from pathwalker_cli.studies.uncertainty import UncertaintyStudy
 
 STUDIES = {
     "perturbation": PerturbationStudy,

@@ -21,15 +21,22 @@ from pathwalker_cli.commands.studies import StudyCall
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.results.run_folder import write_run
+from pathwalker_cli.studies import landscape as module
 from pathwalker_cli.studies import neighbours
-from pathwalker_cli.studies.base import load_study
-from pathwalker_cli.studies.landscape import solve as module
+from pathwalker_cli.studies.base import Work, load_study
+from pathwalker_cli.studies.landscape import (
+    STUDY,
+    Axis,
+    LandscapeStudy,
+    axis_values,
+    grid,
+    landscape_of,
+    varied_springs,
+    with_springs,
+)
 from pathwalker_cli.studies.landscape.figures import landscape_figure
-from pathwalker_cli.studies.landscape.files import ENTRIES, write_landscape
 from pathwalker_cli.studies.landscape.result import Landscape, region_of
-from pathwalker_cli.studies.landscape.solve import grid, landscape_of, with_springs
-from pathwalker_cli.studies.landscape.study import Axis, LandscapeStudy, axis_values
-from pathwalker_cli.studies.landscape.text import landscape_lines
+from pathwalker_cli.studies.landscape.text import landscape_lines, write_tables
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
@@ -53,7 +60,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
         resolver.fails = fails or resolver.fails
         monkeypatch.setattr(neighbours, "resolver_of", lambda run: resolver)
         study = load_study("landscape", LandscapeStudy, changes)
-        found = landscape_of(study, made_run(tmp_path), tmp_path / "points", lambda line: None)
+        found = landscape_of(study, made_run(tmp_path), Work(tmp_path))
         return found, resolver
 
     return make
@@ -117,7 +124,8 @@ def test_the_grid_joins_the_optimum_to_the_corners_of_its_cell() -> None:
 def test_springs_of_a_side_are_prescribed_and_others_stay(side: str) -> None:
     base = load_case("mapd-orthosis")
     sides = LandscapeStudy(base="", side=side).sides
-    given = with_springs(base, sides, (40.0, 10.0)).config.bounds.stiffness
+    springs = varied_springs(LandscapeStudy(base="", side=side), base.walker().unknowns)
+    given = with_springs(base, springs, (40.0, 10.0)).config.bounds.stiffness
     assert given == {
         f"{kind}_stiffness_{s}": (k, k)
         for kind, k in (("dorsiflexion", 40.0), ("plantarflexion", 10.0)) for s in sides
@@ -219,10 +227,9 @@ def test_tied_springs_need_a_solution_to_begin_with(made: Make) -> None:
         made((*COARSE, "side=both"), fails=lambda config: True)
 
 
-def test_barefoot_has_no_landscape(tmp_path: Path) -> None:
-    run = made_run(tmp_path, load_case("mapd-barefoot"))
+def test_barefoot_has_no_landscape() -> None:
     with pytest.raises(ConfigError, match="springs"):
-        landscape_of(LandscapeStudy(base=""), run, tmp_path, lambda line: None)
+        STUDY.require(load_case("mapd-barefoot").config, "base")
 
 
 # Files, figure, words
@@ -231,8 +238,8 @@ def test_barefoot_has_no_landscape(tmp_path: Path) -> None:
 @pytest.mark.drawn
 def test_files(made: Make, tmp_path: Path) -> None:
     landscape, _ = made(leaps=True)
-    write_landscape(tmp_path / "out", landscape)
-    assert {path.name for path in (tmp_path / "out").iterdir()} <= ENTRIES
+    STUDY.write(landscape, made_folder(tmp_path / "out"))
+    assert {path.name for path in (tmp_path / "out").iterdir()} <= STUDY.files
     with (tmp_path / "out" / "landscape.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(landscape.points)
@@ -248,7 +255,7 @@ def test_files(made: Make, tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_integrated_is_null_in_the_summary(made: Make, tmp_path: Path) -> None:
-    write_landscape(tmp_path, made(errors=(5e-4, np.inf))[0])
+    write_tables(made(errors=(5e-4, np.inf))[0], tmp_path)
     checks = json.loads((tmp_path / "landscape.json").read_text(encoding="utf-8"))["reintegration"]
     assert {(check["position"], check["velocity"]) for check in checks.values()} == {(5e-4, None)}
 
@@ -287,6 +294,11 @@ def test_words(made: Make) -> None:
 # The command
 
 
+def made_folder(folder: Path) -> Path:
+    folder.mkdir()
+    return folder
+
+
 def run(*words: object) -> Any:
     return CliRunner().invoke(cli, ["landscape", *map(str, words)])
 
@@ -301,7 +313,7 @@ def test_the_command_writes_everything(
     assert done.exit_code == 0, done.output
     assert "best springs found" in done.stdout
     assert "d4-p1.from.optimum-0" in done.stderr
-    assert {path.name for path in (tmp_path / "out").iterdir()} == ENTRIES - {"base"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == STUDY.files
     again = run("landscape", "--out", tmp_path / "out", *words, "--quiet")
     assert (again.exit_code, again.output) == (0, "")
 

@@ -27,13 +27,16 @@ from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import REGISTRY, TABLES, expanded, measures_in, metrics_of
 from pathwalker_cli.stride.stride import NotKnownError, stride_of
 from pathwalker_cli.studies.batch.cases import BatchCase
-from pathwalker_cli.studies.batch.table import CaseTable
-from pathwalker_cli.studies.landscape.files import write_landscape
+from pathwalker_cli.studies.batch.ledger import CaseTable
+from pathwalker_cli.studies.landscape import text as landscape
 from pathwalker_cli.studies.measures import all_measures, measures
-from pathwalker_cli.studies.sensitivity.result import Sensitivities, Sensitivity
-from pathwalker_cli.studies.sensitivity.text import sensitivity_lines
-from pathwalker_cli.studies.tradeoff.files import write_tradeoff
-from pathwalker_cli.studies.uncertainty.text import uncertainty_lines
+from pathwalker_cli.studies.sensitivity.result import (
+    Sensitivities,
+    Sensitivity,
+    sensitivity_lines,
+)
+from pathwalker_cli.studies.tradeoff import result as tradeoff
+from pathwalker_cli.studies.uncertainty.result import uncertainty_lines
 from report_runs import write_made_run
 from test_report import made_landscape, made_tradeoff, made_uncertainty
 
@@ -94,14 +97,16 @@ def test_a_new_measure_stands_in_every_study(runs: list[Path], tmp_path: Path) -
     optimum = cast(Optimum, SimpleNamespace(series=stylised_series("orthosis"), cost=0.4))
     numbers, metrics = measures(optimum), metrics_in(runs[1])
     assert all_measures(optimum)[KEY] == numbers[KEY] == metrics[KEY]
-    write_landscape(tmp_path / "landscape", made_landscape(metrics, numbers))
-    write_tradeoff(tmp_path / "tradeoff", made_tradeoff(metrics, numbers))
+    for name in ("landscape", "tradeoff"):
+        (tmp_path / name).mkdir()
+    landscape.write_tables(made_landscape(metrics, numbers), tmp_path / "landscape")
+    tradeoff.write_tables(made_tradeoff(metrics, numbers), tmp_path / "tradeoff")
     for name in ("landscape", "tradeoff"):
         with (tmp_path / name / f"{name}.csv").open(encoding="utf-8") as file:
             assert f"{KEY} [1]" in next(csv.reader(file))
     assert "Froude number" in "\n".join(uncertainty_lines(made_uncertainty(metrics, numbers)))
     row = Sensitivity("body_mass", 33.0, numbers, dict.fromkeys(numbers, 0.5))
-    found = Sensitivities(cast(Any, None), "p", numbers, (row,), (), 0, 0, 1.0)
+    found = Sensitivities("mapd-orthosis", "p", 1e-9, numbers, (row,), (), 0, 0, 1.0)
     assert "Froude number" in next(line for i, line in enumerate(sensitivity_lines(found)) if i)
 
 

@@ -12,7 +12,7 @@ from pathwalker_cli.inverse.study import load_inverse_dynamics
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.batch.cases import load_cases
-from pathwalker_cli.studies.landscape.study import LandscapeStudy
+from pathwalker_cli.studies.landscape import LandscapeStudy
 
 PATIENT = "sreenivasa2017-patient"
 

@@ -24,13 +24,12 @@ from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.results import run_folder
-from pathwalker_cli.studies.base import base_run, load_study, require_optimum
-from pathwalker_cli.studies.journal import Journal
+from pathwalker_cli.studies import perturbation as module
+from pathwalker_cli.studies.base import Work, base_run, load_study, require_optimum
 from pathwalker_cli.studies.measures import COMPARED
-from pathwalker_cli.studies.perturbation import study as module
-from pathwalker_cli.studies.perturbation.result import remark
-from pathwalker_cli.studies.perturbation.study import PerturbationStudy, perturb
-from pathwalker_cli.studies.perturbation.text import perturbation_lines
+from pathwalker_cli.studies.neighbours import Journal
+from pathwalker_cli.studies.perturbation import PerturbationStudy, perturb
+from pathwalker_cli.studies.perturbation.result import perturbation_lines, remark
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
@@ -168,7 +167,7 @@ def test_further_factors_start_from_nearer_ones(
         base="x", factors=(0.8, 1.2, 0.9), springs=("dorsiflexion_stiffness_left",)
     )
     run = run_folder.load_run(made_runs / "mapd-orthosis")
-    result = perturb(study, run, tmp_path)
+    result = perturb(study, run, Work(tmp_path))
     held = [c.bounds.stiffness.get("dorsiflexion_stiffness_left") for c in starts]
     assert held == [None, None, (36.0, 36.0)]
     assert [row.factor for row in result.rows] == [0.8, 1.2, 0.9]
@@ -284,14 +283,14 @@ def test_what_was_solved_before_needs_no_optimum(tmp_path: Path) -> None:
 def test_real_neighbours_of_a_coarse_optimum(tmp_path: Path) -> None:
     coarse = {"mesh.intervals": 16, "mesh.refinements": 0, "solver.first_tolerance": 1e-6}
     run = base_run(load_case("mapd-orthosis").with_values(coarse), tmp_path / "base")
-    result = perturb(PerturbationStudy(base="x"), run, tmp_path)
-    assert not result.failed
+    result = perturb(PerturbationStudy(base="x"), run, Work(tmp_path))
+    assert all(row.values for row in result.rows)
     assert "\n".join(perturbation_lines(result))
     for row in result.rows:
-        assert row.values[row.spring] == pytest.approx(0.95 * result.base[row.spring], rel=1e-4)
+        assert row.values[row.name] == pytest.approx(0.95 * result.optimum[row.name], rel=1e-4)
         assert row.iterations < 80
         assert abs(row.changes["cost"]) < 0.05
         moved = [abs(row.changes[key]) for key in COMPARED]
         assert np.isfinite(moved).all()
-        if row.stiffness > result.ranges[row.spring][0]:
-            assert not row.falls, "an optimum within the range"
+        if row.value > result.ranges[row.name][0]:
+            assert not row.cost_falls, "an optimum within the range"

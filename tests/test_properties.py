@@ -49,7 +49,7 @@ from pathwalker_cli.conventions import (
 from pathwalker_cli.errors import ConfigError, PatientError
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.cost_terms import cost_terms
-from pathwalker_cli.gait.costs import Costs
+from pathwalker_cli.gait.costs import Costs, Instant
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.symmetry import asymmetries, full_stride
 from pathwalker_cli.inverse.files import write_strengths_yaml
@@ -677,7 +677,8 @@ def test_discomfort_is_smooth_and_grows_outside_the_range(
         q = [0.0] * len(COORDINATES)
         q[COORDINATES.index("knee_r")] = angle
         zeros = [0.0] * len(GENERATORS)
-        return goals.integrands(PHASES[0], q, q, zeros, zeros, goals.numbers(300.0))[0]
+        point = Instant(PHASES[0], q, q, zeros, zeros)
+        return goals.integrands(point, goals.numbers(300.0), goals.goals)[0]
 
     angle = ca.SX.sym("angle")
     hessian, gradient = ca.hessian(cost(angle), angle)

@@ -31,14 +31,14 @@ from pathwalker_cli.report.html import page_html, page_of
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.springs import recommended, spring_section, verdict_words
 from pathwalker_cli.stride.measures import measures_in
-from pathwalker_cli.studies.landscape.files import write_landscape
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
-from pathwalker_cli.studies.pool import Solved
-from pathwalker_cli.studies.tradeoff.files import write_tradeoff
-from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
+from pathwalker_cli.studies.landscape.text import write_tables as write_landscape
+from pathwalker_cli.studies.neighbours import Solved
+from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff, front_of, judged
+from pathwalker_cli.studies.tradeoff.result import write_tables as write_tradeoff
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input
 from pathwalker_cli.studies.uncertainty.result import Uncertainty
-from pathwalker_cli.studies.uncertainty.text import write_uncertainty
+from pathwalker_cli.studies.uncertainty.result import write_tables as write_uncertainty
 from pathwalker_cli.studies.verdict import verdict_of_metrics
 from report_runs import HOSTILE, made_verdict, write_made_run
 
@@ -494,11 +494,11 @@ def write_studies(folder: Path, run: Path, note: str = "") -> None:
         (folder / name).parent.mkdir(parents=True)
         (folder / name).write_text(json.dumps(content))
     numbers = {measure.key: float(metrics[measure.key]) for measure in measures_in("studies")}
-    write_landscape(folder / "landscape", made_landscape(metrics, numbers))
-    write_tradeoff(folder / "tradeoff", made_tradeoff(metrics, numbers))
-    result = made_uncertainty(metrics, numbers)
-    (folder / "uncertainty").mkdir()
-    write_uncertainty(result, folder / "uncertainty")
+    for name in ("landscape", "tradeoff", "uncertainty"):
+        (folder / name).mkdir()
+    write_landscape(made_landscape(metrics, numbers), folder / "landscape")
+    write_tradeoff(made_tradeoff(metrics, numbers), folder / "tradeoff")
+    write_uncertainty(made_uncertainty(metrics, numbers), folder / "uncertainty")
 
 
 @pytest.fixture
@@ -541,14 +541,15 @@ def made_tradeoff(metrics: dict[str, Any], numbers: dict[str, float]) -> Tradeof
 
     def point(weight: float, speed: float, effort: float, mesh: str = "base") -> FrontPoint:
         measures = {**numbers, "walking_speed": speed, "effort_per_distance": effort}
-        return FrontPoint(f"w{weight:g}", weight, "converged", mesh, measures, (1e-4, 1e-3), 90,
+        return FrontPoint(weight, "converged", mesh, None, measures, (1e-4, 1e-3), 90,
                           0.2, 1, 12)  # fmt: skip
 
     failed = replace(point(3.0, 0.0, 0.0), status="failed", measures={}, errors=(np.nan, np.nan))
-    points = (point(0.0, 0.6, 0.25), point(1.0, 0.9, 0.4), point(2.0, 0.8, 0.5, "inaccurate"))
+    solved = (point(0.0, 0.6, 0.25), point(1.0, 0.9, 0.4), point(2.0, 0.8, 0.5, "inaccurate"))
+    points = judged((*solved, failed))
     return Tradeoff(
-        metrics["patient"], metrics["problem"], "orthosis", (*points, failed), 0.0, numbers,
-        (0.7, 0.9), (1e-3, 1e-2), 9, 1, (12,), 3.0, 1.0, 2, True,
+        metrics["problem"], metrics["patient"], "orthosis", points, 0.0, numbers, front_of(points),
+        (0.7, 0.9), (1e-3, 1e-2), 9, 1, 12.0, 3.0, 1.0, 2, True,
     )  # fmt: skip
 
 
@@ -566,7 +567,8 @@ def made_uncertainty(metrics: dict[str, Any], numbers: dict[str, float]) -> Unce
     factors = np.linspace(0.9, 1.1, 20)[:, None]
     draws = Draws((Input("body_mass", Distribution(relative=0.1)),), factors)
     config = load_config(metrics["problem"])
-    return Uncertainty(config, metrics["patient"], 90, numbers, ranges, draws, solved, 3.0, 1)
+    about = (config, metrics["patient"], 90, numbers, ranges, measures_in("studies"), {})
+    return Uncertainty(*about, draws, solved, 3.0, 1)
 
 
 @pytest.mark.usefixtures("no_curves")

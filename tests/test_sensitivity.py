@@ -10,13 +10,14 @@ import pytest
 from click.testing import CliRunner
 
 from pathwalker_cli.cli import cli
-from pathwalker_cli.config import load_config
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.patient.variation import Variation, varied
+from pathwalker_cli.studies.sensitivity import default_places
 from pathwalker_cli.studies.sensitivity.figures import save_sensitivity_figure
-from pathwalker_cli.studies.sensitivity.result import Check, Sensitivities, Sensitivity
-from pathwalker_cli.studies.sensitivity.study import default_places
-from pathwalker_cli.studies.sensitivity.text import (
+from pathwalker_cli.studies.sensitivity.result import (
+    Check,
+    Sensitivities,
+    Sensitivity,
     agreement,
     label_of,
     sensitivity_lines,
@@ -48,17 +49,17 @@ def made(difference: float = 0.0) -> Sensitivities:
         )
     found = {key: -0.5 * (1.0 + difference) if key == "cost" else 0.0 for key in BASE}
     check = Check("strengths", 5e-4, found, 22, 3.0, 0)
-    config = load_config("mapd-orthosis")
-    return Sensitivities(config, "someone", BASE, tuple(rows), (check,), 400, 12, 1.5)
+    about = ("mapd-orthosis", "someone", 1e-9)
+    return Sensitivities(*about, BASE, tuple(rows), (check,), 400, 12, 1.5)
 
 
-@pytest.mark.parametrize("place", default_places(PATIENT, worn=True))
+@pytest.mark.parametrize("place", default_places(PATIENT, with_orthosis=True))
 def test_every_default_place_is_in_the_file(place: str) -> None:
     assert varied(PATIENT, Variation(scale={place: 1.0001})) is not PATIENT
 
 
 def test_barefoot_no_orthosis_is_asked_about() -> None:
-    places = default_places(PATIENT, worn=False)
+    places = default_places(PATIENT, with_orthosis=False)
     assert not any(place.startswith("orthosis") for place in places)
     assert {"strengths.knee_extension.left", "body_mass", "segment_lengths.shank"} <= set(places)
 

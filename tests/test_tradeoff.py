@@ -21,14 +21,17 @@ from pathwalker_cli.commands.studies import StudyCall
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.studies import neighbours
-from pathwalker_cli.studies.base import load_study
-from pathwalker_cli.studies.run import RunLog
-from pathwalker_cli.studies.tradeoff import study as module
+from pathwalker_cli.studies import tradeoff as module
+from pathwalker_cli.studies.base import Work, load_study
+from pathwalker_cli.studies.tradeoff import STUDY, TradeoffStudy, chain, tradeoff_of
 from pathwalker_cli.studies.tradeoff.figures import labels, tradeoff_figure
-from pathwalker_cli.studies.tradeoff.files import ENTRIES, write_tradeoff
-from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
-from pathwalker_cli.studies.tradeoff.study import TradeoffStudy, chain, tradeoff_of
-from pathwalker_cli.studies.tradeoff.text import tradeoff_lines
+from pathwalker_cli.studies.tradeoff.result import (
+    FrontPoint,
+    Tradeoff,
+    front_of,
+    judged,
+    tradeoff_lines,
+)
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
@@ -42,7 +45,7 @@ Make = Callable[..., tuple[Tradeoff, MadeResolver]]
 def point(name: str, speed: float, effort: float, **changes: Any) -> FrontPoint:
     """Return a point of a front."""
     numbers = {"walking_speed": speed, "effort_per_distance": effort}
-    made = FrontPoint(name, float(name[1:]), "converged", "base", numbers, (1e-4, 1e-3), 107,
+    made = FrontPoint(float(name[1:]), "converged", "base", None, numbers, (1e-4, 1e-3), 107,
                       0.2, 1, 12)  # fmt: skip
     return replace(made, **changes)
 
@@ -60,7 +63,7 @@ def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Make:
         monkeypatch.setattr(neighbours, "resolver_of", lambda run: resolver)
         study = load_study("tradeoff", TradeoffStudy, changes)
         run = made_run(tmp_path)
-        return tradeoff_of(study, run, tmp_path, lambda line: None, RunLog()), resolver
+        return tradeoff_of(study, run, Work(tmp_path)), resolver
 
     return make
 
@@ -131,16 +134,16 @@ def test_the_base_stands_in_the_chain_by_its_weight() -> None:
 
 
 def test_a_point_is_dominated_by_one_that_is_no_slower_and_no_more_costly(made: Make) -> None:
-    points = (
+    points = judged((
         point("w0", 0.6, 0.25),
         point("w1", 0.8, 0.40),
         point("w2", 0.7, 0.45),  # slower and more costly than w1
         point("w3", 0.6, 0.25 + 1e-6),  # the same as w0
         point("w4", 0.9, 0.60),
-    )
-    tradeoff = replace(made()[0], points=points)
-    assert [p.name for p in points if tradeoff.dominated(p)] == ["w2"]
-    assert [p.name for p in tradeoff.front] == ["w0", "w3", "w1", "w4"]
+    ))  # fmt: skip
+    tradeoff = replace(made()[0], points=points, front=front_of(points))
+    assert [p.walking_speed_weight for p in points if p.dominated] == [2.0]
+    assert [p.walking_speed_weight for p in tradeoff.front_points] == [0.0, 3.0, 1.0, 4.0]
 
 
 def test_points_in_one_place_share_a_label() -> None:
@@ -154,9 +157,9 @@ def test_points_in_one_place_share_a_label() -> None:
 def test_the_front_rises(made: Make) -> None:
     tradeoff, _ = made()
     np.testing.assert_allclose([p.speed for p in tradeoff.points], [0.636, 0.636, 0.736, 0.936])
-    assert [p.mesh_status for p in tradeoff.points] == ["base"] * 4
-    assert not any(map(tradeoff.dominated, tradeoff.points))
-    assert tradeoff.recorded is not None
+    assert [p.mesh for p in tradeoff.points] == ["base"] * 4
+    assert not any(p.dominated for p in tradeoff.points)
+    assert tradeoff.recorded_walking_speed is not None
     assert tradeoff.seconds_refined == 0.0
 
 
@@ -164,7 +167,8 @@ def test_weights_that_fail_stay_in_the_table(made: Make, tmp_path: Path) -> None
     tradeoff, _ = made(fails=lambda config: config.cost.walking_speed_weight > 1.0)
     assert [p.solved for p in tradeoff.points] == [True, True, True, False]
     assert "no solve converged" in "\n".join(tradeoff_lines(tradeoff))
-    write_tradeoff(tmp_path / "out", tradeoff)
+    (tmp_path / "out").mkdir()
+    STUDY.write(tradeoff, tmp_path / "out")
     with (tmp_path / "out" / "tradeoff.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [row["status"] for row in rows] == ["converged"] * 3 + ["no solve converged"]
@@ -176,7 +180,7 @@ def test_points_too_rough_are_solved_on_finer_meshes(
 ) -> None:
     tradeoff, _ = made(errors=ROUGH)
     assert refined.keys() == {tmp_path / "runs" / f"w{w:g}" for w in (0, 0.5, 1, 2)}
-    assert [p.mesh_status for p in tradeoff.points] == ["refined"] * 3 + ["inaccurate"]
+    assert [p.mesh for p in tradeoff.points] == ["refined"] * 3 + ["inaccurate"]
     assert [p.intervals for p in tradeoff.points[:3]] == [140] * 3
     assert tradeoff.points[2].effort == 1.2
     assert tradeoff.points[3].errors == ROUGH, "a finer mesh that fails changes no number"
@@ -191,7 +195,7 @@ def test_points_too_rough_are_solved_on_finer_meshes(
 
 def test_without_refinement_rough_points_are_flagged(made: Make) -> None:
     tradeoff, _ = made((*FOUR, "refine=false"), errors=ROUGH)
-    assert [p.mesh_status for p in tradeoff.points] == ["inaccurate"] * 4
+    assert [p.mesh for p in tradeoff.points] == ["inaccurate"] * 4
 
 
 def test_a_second_call_solves_nothing(made: Make) -> None:
@@ -210,13 +214,12 @@ def test_a_failed_solve_is_not_tried_again(made: Make) -> None:
     assert first.failed_solves > 0
     second, resolver = made(fails=never)
     assert resolver.solved == []
-    assert {LIMIT} >= {p.status for p in second.points if p.name == LIMIT}
+    assert {LIMIT} >= {p.status for p in second.points if not p.solved and p.status == LIMIT}
 
 
-def test_a_fit_has_no_trade_off(tmp_path: Path) -> None:
-    run = made_run(tmp_path, load_case("ls-barefoot"))
+def test_a_fit_has_no_trade_off() -> None:
     with pytest.raises(ConfigError, match="follows a recording"):
-        tradeoff_of(TradeoffStudy(base=""), run, tmp_path, lambda line: None, RunLog())
+        STUDY.require(load_case("ls-barefoot").config, "base")
 
 
 # Files, figure, command
@@ -225,8 +228,9 @@ def test_a_fit_has_no_trade_off(tmp_path: Path) -> None:
 @pytest.mark.drawn
 def test_files_and_figure(made: Make, tmp_path: Path) -> None:
     tradeoff, _ = made()
-    write_tradeoff(tmp_path / "out", tradeoff)
-    assert {path.name for path in (tmp_path / "out").iterdir()} <= ENTRIES
+    (tmp_path / "out").mkdir()
+    STUDY.write(tradeoff, tmp_path / "out")
+    assert {path.name for path in (tmp_path / "out").iterdir()} <= STUDY.files
     for extension in ("png", "svg"):
         assert (tmp_path / "out" / "figures" / f"tradeoff.{extension}").stat().st_size > 10_000
     figure = tradeoff_figure(tradeoff)
@@ -257,7 +261,7 @@ def test_the_command_writes_everything(
     assert done.exit_code == 0, done.output
     assert "effort" in done.stdout
     assert "w1.from.w0.5-0" in done.stderr
-    assert {path.name for path in (tmp_path / "out").iterdir()} == ENTRIES - {"base", "runs"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == STUDY.files - {"runs"}
     again = run(*words, "--quiet")
     assert (again.exit_code, again.output) == (0, "")
 

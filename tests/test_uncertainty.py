@@ -20,12 +20,12 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.studies import pool
-from pathwalker_cli.studies.base import base_run, load_study
-from pathwalker_cli.studies.uncertainty import study as module
+from pathwalker_cli.studies import neighbours
+from pathwalker_cli.studies import uncertainty as module
+from pathwalker_cli.studies.base import Work, base_run, load_study
+from pathwalker_cli.studies.uncertainty import UncertaintyStudy, draw_cases, uncertainty
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input, draw, inputs_of
 from pathwalker_cli.studies.uncertainty.result import chance_level, rank_correlations, spreads
-from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy, draw_cases, uncertainty
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
@@ -149,7 +149,7 @@ def test_chance_level_is_exceeded_by_idle_inputs_in_five_of_a_hundred_studies() 
 @pytest.fixture
 def resolver(monkeypatch: pytest.MonkeyPatch) -> StandInResolver:
     stand_in = StandInResolver(load_case("mapd-orthosis"))
-    for place in (module, pool):
+    for place in (module, neighbours):
         monkeypatch.setattr(place, "resolver_of", lambda run, tolerance: stand_in)
         monkeypatch.setattr(place, "measures", stand_in_measures)
     return stand_in
@@ -312,8 +312,8 @@ def test_real_draws_do_not_depend_on_the_number_of_processes(tmp_path: Path) -> 
         "body_mass": Distribution(relative=0.02),
     }
     study = UncertaintyStudy(base="x", draws=4, quantities=quantities)
-    one = uncertainty(study, run, tmp_path / "one", 1)
-    two = uncertainty(study, run, tmp_path / "two", 2)
+    one = uncertainty(study, run, Work(tmp_path / "one", workers=1))
+    two = uncertainty(study, run, Work(tmp_path / "two", workers=2))
     assert not one.failed
     for a, b in zip(one.solved, two.solved, strict=True):
         assert a.values == pytest.approx(b.values, rel=1e-9)

@@ -18,19 +18,16 @@ from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.yaml_file import validate
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.patient.blocks import RealSpring, SpringSet
+from pathwalker_cli.studies.judge import _nearest, _quadratic_edge, _stops, verdict_of
 from pathwalker_cli.studies.verdict import (
     SHARE,
     NumberVerdict,
     SnappedSprings,
     StopVerdict,
     Verdict,
-    _nearest,
-    _quadratic_edge,
-    _stops,
-    verdict_of,
+    verdict_lines,
     verdict_of_metrics,
 )
-from pathwalker_cli.studies.verdict_text import verdict_lines
 
 INSIDE = NumberVerdict(
     "plantarflexion_stiffness_right", "K_P right", "N m/rad", 20.0,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from pydantic import BaseModel
 
-from pathwalker_cli.checking import studies
 from pathwalker_cli.checking.consistency import odd_orthosis
 from pathwalker_cli.checking.patient import (
     orthosis_content,
@@ -18,6 +18,7 @@ from pathwalker_cli.checking.patient import (
 )
 from pathwalker_cli.checking.prediction import check_prediction
 from pathwalker_cli.checking.report import Changes, Checked, Row
+from pathwalker_cli.checking.studies import check_batch, check_study
 from pathwalker_cli.config import StudyConfig, config_content, find_config
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import ConfigError, placed
@@ -37,12 +38,8 @@ from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient, shipped_patients
 from pathwalker_cli.problems import problem_named
 from pathwalker_cli.results.text import orthosis_rows
+from pathwalker_cli.studies import STUDIES
 from pathwalker_cli.studies.batch.schema import BatchStudy
-from pathwalker_cli.studies.landscape.study import LandscapeStudy
-from pathwalker_cli.studies.perturbation.study import PerturbationStudy
-from pathwalker_cli.studies.sensitivity.study import SensitivityStudy
-from pathwalker_cli.studies.tradeoff.study import TradeoffStudy
-from pathwalker_cli.studies.uncertainty.study import UncertaintyStudy
 
 __all__ = ["KINDS", "another_kind", "check_file", "check_orthosis"]
 
@@ -175,12 +172,11 @@ class Kind(NamedTuple):
 
 KINDS: Final[dict[str, Kind]] = {
     "prediction": Kind(StudyConfig, check_prediction, "pathwalker solve PROBLEM"),
-    "perturbation": Kind(PerturbationStudy, studies.check_perturbation, "pathwalker perturb"),
-    "sensitivity": Kind(SensitivityStudy, studies.check_sensitivity, "pathwalker sensitivity"),
-    "uncertainty": Kind(UncertaintyStudy, studies.check_uncertainty, "pathwalker uncertainty"),
-    "landscape": Kind(LandscapeStudy, studies.check_landscape, "pathwalker landscape"),
-    "tradeoff": Kind(TradeoffStudy, studies.check_tradeoff, "pathwalker tradeoff"),
-    "cohort": Kind(BatchStudy, studies.check_batch, "pathwalker batch"),
+    **{
+        entry.name: Kind(entry.load().model, partial(check_study, command), f"pathwalker {command}")
+        for command, entry in STUDIES.items()
+    },
+    "cohort": Kind(BatchStudy, check_batch, "pathwalker batch"),
     "inverse-kinematics": Kind(InverseKinematicsConfig, check_kinematics, "pathwalker ik"),
     "inverse-dynamics": Kind(InverseDynamicsConfig, check_dynamics, "pathwalker id"),
     "markers": Kind(

@@ -25,7 +25,7 @@ from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.results.run_folder import ENTRIES, check_target, default_folder
-from pathwalker_cli.studies.batch.checks import check_patient
+from pathwalker_cli.studies.batch.cases import check_patient
 
 __all__ = ["FIXED", "MEASURED", "check_prediction", "described", "expected", "ready_solver"]
 

@@ -71,8 +71,12 @@ def batch_command(
     from pathwalker_cli.commands.progress import BatchProgress
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.studies.batch.cases import load_cases
-    from pathwalker_cli.studies.batch.study import run_batch
-    from pathwalker_cli.studies.batch.text import failure_sentence, report_content, report_text
+    from pathwalker_cli.studies.batch.study import (
+        failure_sentence,
+        report_content,
+        report_text,
+        run_batch,
+    )
 
     with meant_as("cohort", study):
         batch = load_cases(study, changes)
@@ -98,7 +102,7 @@ def _pool(
     import os
 
     if scheduler is None:
-        from pathwalker_cli.studies.batch.local import LocalPool
+        from pathwalker_cli.studies.batch.worker import LocalPool
 
         return nullcontext(LocalPool(workers or len(os.sched_getaffinity(0)), time_limit))
     _check_options(workers, scheduler, time_limit)

@@ -10,6 +10,8 @@ from typing import Final
 import click
 from click.shell_completion import CompletionItem
 
+from pathwalker_cli.studies import STUDIES
+
 __all__ = [
     "complete_configs",
     "complete_keys",
@@ -26,11 +28,7 @@ _SHIPPED: Final = {
     "batch": "cohort",
     "id": "inverse-dynamics",
     "ik": "inverse-kinematics",
-    "landscape": "landscape",
-    "perturb": "perturbation",
-    "sensitivity": "sensitivity",
-    "tradeoff": "tradeoff",
-    "uncertainty": "uncertainty",
+    **{name: entry.name for name, entry in STUDIES.items()},
 }
 """Shipped configs of commands that read others than predictions."""
 

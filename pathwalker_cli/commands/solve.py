@@ -130,7 +130,7 @@ def _report(outcome: Outcome, folder: Path) -> None:
         summary_renderable,
         summary_rows,
     )
-    from pathwalker_cli.studies.verdict_text import verdict_lines
+    from pathwalker_cli.studies.verdict import verdict_lines
 
     solution, metrics, verdict = outcome
     if solution.config.smoke:

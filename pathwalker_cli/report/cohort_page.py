@@ -9,8 +9,7 @@ from typing import Final
 from pathwalker_cli.conventions import SIDES, to_degrees
 from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
-from pathwalker_cli.studies.batch.ledger import CASES, TABLE
-from pathwalker_cli.studies.batch.table import CONVERGED, PENDING, read_metrics
+from pathwalker_cli.studies.batch.ledger import CASES, CONVERGED, PENDING, TABLE, read_metrics
 
 __all__ = ["cohort_page"]
 

@@ -6,38 +6,31 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
+from pathwalker_cli import studies
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.io.yaml_file import validate
-from pathwalker_cli.report.summaries import SUMMARIES
+from pathwalker_cli.report.summaries import SUMMARIES, Summary
 
 __all__ = ["STUDIES", "Kind", "Study", "folder_kind", "sorted_folders", "studies_near"]
 
-Kind = Literal[
-    "run", "recorded", "cohort", "perturb", "sensitivity", "landscape", "tradeoff", "uncertainty"
-]
-
-_MARKS: Final[tuple[tuple[Kind, str], ...]] = (
-    ("run", "metrics.json"),
-    ("perturb", "perturbation.json"),
-    ("sensitivity", "sensitivity.json"),
-    ("landscape", "landscape.json"),
-    ("tradeoff", "tradeoff.json"),
-    ("uncertainty", "uncertainty.json"),
-    ("cohort", "cases.csv"),
-    ("recorded", "stances.csv"),
-)
-"""A file that only such a folder has."""
+Kind = str
+"""A run, recorded gait, a cohort, or the command of a study."""
 
 STUDIES: Final[Mapping[Kind, str]] = {
-    kind: file for kind, file in _MARKS if kind not in ("run", "recorded", "cohort")
+    kind: studies.STUDIES[kind].summary for kind in dict.fromkeys((*SUMMARIES, *studies.STUDIES))
 }
-"""The studies around an optimum and their summaries."""
+"""The studies around an optimum and their summaries, in the order of a page."""
+
+_MARKS: Final[Mapping[Kind, str]] = {
+    "run": "metrics.json", **STUDIES, "cohort": "cases.csv", "recorded": "stances.csv",
+}  # fmt: skip
+"""A file that only such a folder has."""
 
 _ALLOWED: Final = (
-    "folders that solve, id, batch, perturb, sensitivity, landscape, tradeoff or uncertainty of "
+    f"folders that solve, id, batch, {', '.join([*STUDIES][:-1])} or {[*STUDIES][-1]} of "
     "pathwalker wrote"
 )
 
@@ -97,7 +90,7 @@ def folder_kind(folder: Path) -> Kind:
 
 
 def _kind(folder: Path) -> Kind | None:
-    return next((kind for kind, file in _MARKS if (folder / file).is_file()), None)
+    return next((kind for kind, file in _MARKS.items() if (folder / file).is_file()), None)
 
 
 def sorted_folders(folders: Sequence[Path]) -> dict[Kind, tuple[Path, ...]]:
@@ -174,7 +167,7 @@ def _study(folder: Path, kind: Kind) -> Study:
     """
     path = folder / STUDIES[kind]
     content = read_json(path, mend="make the study again")
-    validate(content, SUMMARIES[kind], where=str(path), error=DataError)
+    validate(content, SUMMARIES.get(kind, Summary), where=str(path), error=DataError)
     return Study(folder, kind, content)
 
 

@@ -16,7 +16,7 @@ from pathwalker_cli.report.springs import prescribed, recommended, spring_sectio
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.stride.measure import KNEE, Measure
 from pathwalker_cli.stride.measures import measure_of, measures_in
-from pathwalker_cli.studies.verdict_text import snapped_warning
+from pathwalker_cli.studies.verdict import snapped_warning
 
 __all__ = ["gait_page", "gait_section"]
 

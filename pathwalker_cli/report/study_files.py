@@ -9,9 +9,9 @@ import numpy as np
 
 from pathwalker_cli.io.csv_file import read_rows
 from pathwalker_cli.report.folders import Study
-from pathwalker_cli.stride.measures import measure_of, measures_in
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
-from pathwalker_cli.studies.springs import Ranges
+from pathwalker_cli.studies.measures import Ranges, measures_with
 from pathwalker_cli.studies.uncertainty.result import Spread
 
 __all__ = ["Spreads", "landscape_of", "spreads_of"]
@@ -98,11 +98,12 @@ def spreads_of(study: Study) -> Spreads:
     """
     content = study.content
     entries: dict[str, dict[str, Any]] = content["spreads"]
+    measures = {m.key: m for m in measures_with(content.get("further", {}))}
     rows = read_rows(study.folder / "draws.csv", ("draw", "status", *entries))
     solved = [row for row in rows if row["cost"]]
     spreads = tuple(
         Spread(
-            measure=measure_of(key),
+            measure=measures[key],
             base=float(content["base"][key]),
             quantiles=tuple(
                 np.nan if entry["quantiles"][q] is None else float(entry["quantiles"][q])
@@ -117,7 +118,11 @@ def spreads_of(study: Study) -> Spreads:
     )
     return Spreads(
         values={key: np.array([float(row[key]) for row in solved]) for key in entries},
-        ranges={name: (pair[0], pair[1]) for name, pair in content["stiffness_ranges"].items()},
+        ranges={
+            name: (pair[0], pair[1])
+            for key in ("stiffness_ranges", "number_ranges")
+            for name, pair in content.get(key, {}).items()
+        },
         spreads=spreads,
         strongest={k: e["strongest_input"] for k, e in entries.items() if e["strongest_input"]},
         draws=int(content["draws"]),

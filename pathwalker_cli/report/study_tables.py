@@ -16,13 +16,12 @@ from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.springs import recommended
 from pathwalker_cli.report.study_files import Spreads, landscape_of, spreads_of
 from pathwalker_cli.stride.measures import measure_of, measures_in
+from pathwalker_cli.studies import STUDIES
 from pathwalker_cli.studies.landscape.figures import Chosen
 from pathwalker_cli.studies.measures import COMPARED
-from pathwalker_cli.studies.sensitivity.text import label_of
-from pathwalker_cli.studies.tradeoff.files import tradeoff_of_content
-from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
-from pathwalker_cli.studies.uncertainty.result import Spread
-from pathwalker_cli.studies.uncertainty.text import shown_text
+from pathwalker_cli.studies.sensitivity.result import label_of
+from pathwalker_cli.studies.tradeoff.result import FrontPoint, tradeoff_of_content
+from pathwalker_cli.studies.uncertainty.result import Spread, shown_text
 
 __all__ = ["study_section"]
 
@@ -48,10 +47,16 @@ def study_section(study: Study, run: ReportRun) -> Section:
         "uncertainty": _uncertainty,
     }
     try:
-        return make[study.kind](study, run)
+        return make.get(study.kind, _other)(study, run)
     except (LookupError, TypeError, AttributeError, ValueError, StopIteration) as problem:
         what = f"does not hold what `pathwalker {study.kind}` writes: {problem!r}"
         raise DataError(what, where=str(study.folder), mend="make the study again") from None
+
+
+def _other(study: Study, run: ReportRun) -> Section:
+    """Return where the numbers of a study stand that pages draw no table of."""
+    entry = STUDIES[study.kind]
+    return Section(entry.heading, (f"{entry.title} Its numbers: {study.folder / entry.summary}.",))
 
 
 def _sensitivity(study: Study, run: ReportRun) -> Section:
@@ -94,9 +99,10 @@ def _perturbation(study: Study, run: ReportRun) -> Section:
     """Return what moved springs change."""
     rows = []
     for row in study.content["rows"]:
-        label = f"{measure_of(row['spring']).label} {100.0 * (row['factor'] - 1.0):+.3g} %"
+        name = measure_of(row["spring"]).label if "spring" in row else row["label"]
+        label = f"{name} {100.0 * (row['factor'] - 1.0):+.3g} %"
         changes = (row["changes"].get(key) for key in COMPARED)
-        cells = (label, f"{row['stiffness']:.1f}", *map(_change, changes), row["note"])
+        cells = (label, _moved_to(row), *map(_change, changes), row["note"])
         rows.append(Row(cells, "" if row["status"] == "converged" else "failed"))
     head = ("spring", "[N m/rad]", *(f"{measure_of(key).short} [%]" for key in COMPARED), "remark")
     columns = f"wn{'n' * len(COMPARED)}p"
@@ -104,6 +110,13 @@ def _perturbation(study: Study, run: ReportRun) -> Section:
     return Section(
         "Perturbation of the springs", tables=(Table(head, tuple(rows), caption, columns=columns),)
     )
+
+
+def _moved_to(row: Mapping[str, Any]) -> str:
+    """Return what a number was moved to: springs in the unit of the column, others in their own."""
+    if "stiffness" in row:
+        return f"{row['stiffness']:.1f}"
+    return f"{row['value']:.4g} {row['unit']}"
 
 
 def _change(share: float | None) -> str:
@@ -157,7 +170,7 @@ def _side(side: str) -> str:
 def _tradeoff(study: Study, run: ReportRun) -> Section:
     """Return the front of speed and effort, and the springs along it."""
     tradeoff = tradeoff_of_content(study.content)
-    springs = STIFFNESSES if tradeoff.condition == "orthosis" else ()
+    springs = tradeoff.springs
     head = ("weight of speed [s^2/m^2]", "speed [m/s]", "effort [s/m]",
             *(f"{measure_of(name).short} [N m/rad]" for name in springs), "remark")  # fmt: skip
     rows = []
@@ -167,7 +180,7 @@ def _tradeoff(study: Study, run: ReportRun) -> Section:
             numbers += [f"{point.measures[name]:.1f}" for name in springs]
         else:
             numbers = ["-"] * (2 + len(springs))
-        cells = (f"{point.weight:g}", *numbers, _remark(tradeoff, point))
+        cells = (f"{point.walking_speed_weight:g}", *numbers, _remark(point))
         rows.append(Row(cells, "" if point.solved else "failed"))
     table = Table(head, tuple(rows), columns=f"w{'n' * (len(head) - 2)}p")
     lines = [
@@ -179,12 +192,12 @@ def _tradeoff(study: Study, run: ReportRun) -> Section:
                    drawings=drawings)  # fmt: skip
 
 
-def _remark(tradeoff: Tradeoff, point: FrontPoint) -> str:
+def _remark(point: FrontPoint) -> str:
     """Return what to know about a point of a front, "" for nothing."""
     if not point.solved:
         return point.status
-    remarks = ["dominated"] * tradeoff.dominated(point)
-    remarks += ["mesh too coarse: rough numbers"] * (point.mesh_status == "inaccurate")
+    remarks = ["dominated"] * bool(point.dominated)
+    remarks += ["mesh too coarse: rough numbers"] * (point.mesh == "inaccurate")
     return "; ".join(remarks)
 
 
@@ -215,17 +228,18 @@ def _spread_row(spreads: Spreads, spread: Spread) -> Row:
 
 def _chance(spreads: Spreads, spread: Spread) -> str:
     """Return in words how often a spring sits at a limit, "" for other measures."""
-    key, label = spread.measure.key, spread.measure.label
+    key, label, unit = spread.measure.key, spread.measure.label, spread.measure.unit
     if key not in spreads.ranges:
         return ""
     low, high = spreads.ranges[key]
     if low == high:
-        return f"{label} is prescribed: {low:g} N m/rad."
+        return f"{label} is prescribed: {low:g} {unit}."
     if spread.lower is None or spread.upper is None:
         return ""
     inside = 1.0 - spread.lower - spread.upper
-    parts = [(spread.upper, f"the stiffest ({high:g} N m/rad)"),
-             (spread.lower, f"the softest ({low:g} N m/rad)"),
+    most, least = ("stiffest", "softest") if key in STIFFNESSES else ("largest", "least")
+    parts = [(spread.upper, f"the {most} ({high:g} {unit})"),
+             (spread.lower, f"the {least} ({low:g} {unit})"),
              (inside, "one between")]  # fmt: skip
     shares = ", ".join(f"{words} in {100 * share:.0f} %" for share, words in parts if share > 0.0)
     return f"{label}: least effort takes {shares} of the draws."

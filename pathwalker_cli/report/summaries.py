@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Final
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from pathwalker_cli.io.fields import invalid
 from pathwalker_cli.stride.measures import measures_in
 
-__all__ = ["SUMMARIES"]
+__all__ = ["SUMMARIES", "Summary"]
 
 Number = float | None
 Numbers = dict[str, Number]
@@ -22,55 +22,55 @@ def _known(key: str) -> str:
     return key
 
 
-class _Summary(BaseModel):
+class _Block(BaseModel):
     """Further entries may be anything."""
 
     model_config = ConfigDict(extra="allow")
 
 
-class _Moved(_Summary):
-    spring: Annotated[str, AfterValidator(_known)]
+class Summary(_Block):
+    """What every study tells."""
+
+    problem: str
+    patient: str
+
+
+class _Moved(_Block):
+    spring: Annotated[str, AfterValidator(_known)] | None = None
     factor: float
-    stiffness: float
     status: str
     changes: Numbers
     note: str
 
 
-class _Perturbation(_Summary):
-    problem: str
-    patient: str
+class _Perturbation(Summary):
     optimum: Numbers
     rows: list[_Moved]
 
 
-class _Sensitivity(_Summary):
-    problem: str
-    patient: str
+class _Sensitivity(Summary):
     optimum: Numbers
     elasticities: dict[str, Numbers]
 
 
-class _Point(_Summary):
+class _Point(_Block):
     dorsiflexion_stiffness: Number
     plantarflexion_stiffness: Number
     measures: Numbers
 
 
-class _Best(_Summary):
+class _Best(_Block):
     dorsiflexion_stiffness: float
     plantarflexion_stiffness: float
 
 
-class _Region(_Summary):
+class _Region(_Block):
     dorsiflexion_stiffness: Pair
     plantarflexion_stiffness: Pair
     share_of_points: float
 
 
-class _Landscape(_Summary):
-    problem: str
-    patient: str
+class _Landscape(Summary):
     side: str
     tolerance: Annotated[float, Field(ge=0.0)]
     dorsiflexion_stiffness: list[float]
@@ -80,7 +80,7 @@ class _Landscape(_Summary):
     region: _Region | None
 
 
-class _FrontPoint(_Summary):
+class _FrontPoint(_Block):
     walking_speed_weight: float
     status: str
     mesh: str | None
@@ -92,9 +92,7 @@ class _FrontPoint(_Summary):
     iterations: int
 
 
-class _Tradeoff(_Summary):
-    problem: str
-    patient: str
+class _Tradeoff(Summary):
     condition: str
     points: Annotated[list[_FrontPoint], Field(min_length=1)]
     base_weight: float
@@ -103,7 +101,7 @@ class _Tradeoff(_Summary):
     tolerances: Pair
 
 
-class _Spread(_Summary):
+class _Spread(_Block):
     quantiles: Numbers
     share_at_lower_limit: Number
     share_at_upper_limit: Number
@@ -111,14 +109,19 @@ class _Spread(_Summary):
     rank_correlation: Number
 
 
-class _Uncertainty(_Summary):
-    problem: str
-    patient: str
+class _Uncertainty(Summary):
     draws: Annotated[int, Field(ge=0)]
     failed: list[str]
     base: Numbers
     stiffness_ranges: dict[Annotated[str, AfterValidator(_known)], Pair]
-    spreads: dict[Annotated[str, AfterValidator(_known)], _Spread]
+    further: dict[str, str] = {}
+    spreads: dict[str, _Spread]
+
+    @model_validator(mode="after")
+    def _known_spreads(self) -> _Uncertainty:
+        for key in self.spreads.keys() - self.further.keys():
+            _known(key)
+        return self
 
 
 SUMMARIES: Final[dict[str, type[BaseModel]]] = {

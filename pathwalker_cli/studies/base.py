@@ -1,19 +1,21 @@
-"""What every study begins with: its own config, and the optimum whose neighbours it solves."""
+"""What every study is: config, plan, run and result, and the optimum that it begins with."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, Generic, Literal, TypeVar
 
 from pydantic import Field
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.config import load_config, place_of, read_config, with_values
-from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.config import StudyConfig, load_config, place_of, read_config, with_values
+from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError
 from pathwalker_cli.gait.resolve import Optimum, Resolver
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.atomic import check_room, sweep
 from pathwalker_cli.io.fields import YamlModel
 from pathwalker_cli.io.lock import locked
@@ -22,14 +24,20 @@ from pathwalker_cli.studies.run import RunLog, done_run, run_study
 
 __all__ = [
     "NeighbourStudy",
+    "Plan",
+    "StudyKind",
+    "Work",
     "base_case",
     "base_run",
     "check_folder",
     "claimed_folder",
     "load_study",
+    "planned",
     "require_optimum",
     "resolver_of",
 ]
+
+_TRANSCRIPTION: Final = "collocation"
 
 
 class NeighbourStudy(YamlModel):
@@ -41,8 +49,114 @@ class NeighbourStudy(YamlModel):
     base: str
     set: dict[str, Any] = Field(default_factory=dict)
 
+    def solved_as(self, case: Case) -> Case:
+        """Return a case as the study solves it: to a tolerance of its own where it has one."""
+        return case
 
-Study = TypeVar("Study", bound=YamlModel)
+
+Study = TypeVar("Study", bound=NeighbourStudy)
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study would do.
+
+    Args:
+        does: In words.
+        solves: Number of neighbours that are solved.
+        least: Whether there may be more.
+    """
+
+    does: str
+    solves: int
+    least: bool = False
+
+
+@dataclass(frozen=True)
+class Work:
+    """Where a study works, and who hears of it.
+
+    Args:
+        folder: Its folder; what is solved there already is not solved again.
+        report: Is given a line for every neighbour.
+        log: Hears every iteration of solves on new meshes.
+        workers: Processes to solve on.
+    """
+
+    folder: Path
+    report: Callable[[str], None] = lambda line: None
+    log: RunLog = field(default_factory=RunLog)
+    workers: int = 1
+
+
+@dataclass(frozen=True)
+class StudyKind(Generic[Study, Result]):
+    """A kind of study.
+
+    Args:
+        model: Its config.
+        files: Names of the files and folders that it writes, the base apart.
+        varies: What the base must have: "springs", or "numbers" that it may choose, springs or
+            others; "" for nothing.
+        plan: What would be done around the base that a solver would solve; nothing is solved.
+        run: Does it around the converged run of the base.
+        write: Writes all files of a result into a folder.
+        content: A result as plain values for JSON, SI units.
+        lines: A result as lines for the terminal.
+        failed: What of a result in a folder did not converge, in one sentence; "" if nothing.
+        predicts: Whether the base must not follow a recording.
+        whole_cycle: Whether the base must be a whole stride, in which sides may differ.
+    """
+
+    model: type[Study]
+    files: frozenset[str]
+    varies: Literal["", "numbers", "springs"]
+    plan: Callable[[Study, GaitSolver], Plan]
+    run: Callable[[Study, Run, Work], Result]
+    write: Callable[[Result, Path], None]
+    content: Callable[[Result], Mapping[str, Any]]
+    lines: Callable[[Result], Iterable[str]]
+    failed: Callable[[Result, Path], str] = lambda result, folder: ""
+    predicts: bool = False
+    whole_cycle: bool = True
+
+    def require(self, config: StudyConfig, where: str) -> None:
+        """Refuse a problem that the study cannot take.
+
+        Args:
+            config: The problem.
+            where: Where it comes from, for the message.
+
+        Raises:
+            ConfigError: If it lacks what is varied, or its neighbours cannot be solved.
+        """
+        freed = self.varies == "numbers" and config.free
+        if self.varies and config.condition != "orthosis" and not freed:
+            raise ConfigError(
+                f"{config.problem} is walked barefoot and has no springs",
+                where=where,
+                allowed="a problem with orthoses, e.g. mapd-orthosis",
+            )
+        if config.transcription != _TRANSCRIPTION:
+            raise ConfigError(
+                f"is solved by {config.transcription}, but neighbours are solved by "
+                f"{_TRANSCRIPTION}",
+                where=where,
+                mend=f"solve it with transcription: {_TRANSCRIPTION}",
+            )
+        if self.predicts and config.fits:
+            raise ConfigError(
+                f"is {config.problem}, which follows a recording",
+                where=where,
+                allowed="a prediction, e.g. mapd-orthosis",
+            )
+        if self.whole_cycle and config.half_cycle:
+            raise ConfigError(
+                "is solved as half a cycle, in which the numbers of one side cannot change alone",
+                where=where,
+                mend="solve it with half_cycle: false",
+            )
 
 
 def load_study(path: str | Path, model: type[Study], changes: tuple[str, ...] = ()) -> Study:
@@ -57,13 +171,10 @@ def load_study(path: str | Path, model: type[Study], changes: tuple[str, ...] = 
         ConfigError: If file or overrides are wrong.
     """
     study, source = read_config(path, model, changes)
-    base = getattr(study, "base", "")
-    beside = place_of("base", source, changes) / base
-    return (
-        study.model_copy(update={"base": str(beside.resolve())})
-        if base and os.path.isfile(beside)
-        else study
-    )
+    beside = place_of("base", source, changes) / study.base
+    if study.base and os.path.isfile(beside):
+        return study.model_copy(update={"base": str(beside.resolve())})
+    return study
 
 
 def base_case(study: NeighbourStudy) -> Case:
@@ -75,6 +186,50 @@ def base_case(study: NeighbourStudy) -> Case:
     """
     config = load_config(study.base)
     return Case.of(with_values(config, study.set, f"set of the study on {study.base}"))
+
+
+def planned(
+    kind: StudyKind[Study, Any], study: Study, given: Path | None = None
+) -> tuple[Case, Run | None]:
+    """Return the base of a study once all is checked that can be known without a solve.
+
+    Args:
+        kind: The kind of the study.
+        study: Its config.
+        given: Folder of the run to stand on; None for the base of the study.
+
+    Returns:
+        The case, and its run if one was given.
+
+    Raises:
+        ConfigError: If the study cannot take the base, or asks for what it does not have.
+        DataError: If the run cannot be used.
+    """
+    run = None if given is None else _given(study, given)
+    case, where = (base_case(study), f"base {study.base}") if run is None else (
+        run.case, f"--run {given}")  # fmt: skip
+    kind.require(case.config, where)
+    kind.plan(study, GaitSolver(study.solved_as(case)))
+    return case, run
+
+
+def _given(study: NeighbourStudy, folder: Path) -> Run:
+    """Return the run that was named.
+
+    Raises:
+        ConfigError: If the study overrides values of the base.
+        DataError: If the run cannot be used.
+    """
+    if study.set:
+        raise ConfigError(
+            "overrides values of the base, but --run brings a config of its own",
+            where="set",
+            mend="leave one of the two out",
+        )
+    try:
+        return load_run(folder)
+    except NotConvergedError as error:
+        raise DataError(str(error), where="--run", allowed="a converged run") from None
 
 
 def base_run(case: Case, folder: Path, log: RunLog | None = None) -> Run:
@@ -134,8 +289,8 @@ def check_folder(folder: Path, entries: frozenset[str], command: str) -> None:
     if folder.exists() and not folder.is_dir():
         raise DataError("is a file, not a folder", where=str(folder), mend="choose another --out")
     check_room(folder)
-    found = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    foreign = sorted(name for name in found - entries if not name.startswith("."))
+    there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    foreign = sorted(name for name in there - entries if not name.startswith("."))
     if foreign:
         raise DataError(
             f"is not empty and holds {foreign[0]}, which is no result of this command",

@@ -8,33 +8,162 @@ neighbour is tried from it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Generic
+from functools import cached_property
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from pathwalker_cli.studies.graph import (
-    Attempt,
-    Branch,
-    Exploration,
-    Found,
-    Graph,
-    Rules,
-    Solve,
-    Values,
-)
+__all__ = ["Attempt", "Branch", "Exploration", "Graph", "Rules", "Solve", "Values", "explore"]
 
-__all__ = ["explore"]
+Values = tuple[float, ...]
+
+
+class Solved(Protocol):
+    """What the end of a solve must tell."""
+
+    @property
+    def cost(self) -> float:
+        """Value of the objective."""
+
+    @property
+    def converged(self) -> bool:
+        """Whether it is a solution."""
+
+
+End = TypeVar("End", bound=Solved)
+Solve = Callable[[str, Values, End | None], End]
+"""Name, values and start to the end of a solve."""
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Points and who is whose neighbour.
+
+    Args:
+        points: Values of every point by its name, in order.
+        edges: Pairs of neighbours.
+        root: The point that is solved already.
+    """
+
+    points: Mapping[str, Values]
+    edges: tuple[tuple[str, str], ...]
+    root: str
+
+    @cached_property
+    def neighbours(self) -> dict[str, tuple[str, ...]]:
+        """Neighbours of every point, in the order of the points."""
+        pairs = {*self.edges, *((b, a) for a, b in self.edges)}
+        return {a: tuple(b for b in self.points if (a, b) in pairs) for a in self.points}
+
+    @cached_property
+    def outwards(self) -> tuple[str, ...]:
+        """All points that can be reached from the root, nearest first."""
+        reached = [self.root]
+        for point in reached:  # grows while it is walked
+            reached += [near for near in self.neighbours[point] if near not in reached]
+        return tuple(reached)
+
+
+@dataclass(frozen=True)
+class Rules(Generic[End]):
+    """When two solutions are one, and how long to look for more.
+
+    Args:
+        distance: How far two solutions of neighbours lie apart, in any unit.
+        signature: Numbers by which local optima of equal cost still differ, shape (n,).
+        scale: The amount that differences of cost are relative to.
+        cost_tolerance: Relative difference of cost beyond which two solutions are two optima.
+        signature_tolerance: The same for every number of the signature.
+        jump: Multiple of the median distance of neighbours beyond which they are tried from one
+            another; 0 tries all.
+        sweeps: Largest number of sweeps.
+        halvings: How often a step that failed is halved.
+    """
+
+    distance: Callable[[End, End], float]
+    signature: Callable[[End], np.ndarray]
+    scale: Callable[[End], float] = lambda end: abs(end.cost)
+    cost_tolerance: float = 1e-3
+    signature_tolerance: float = 0.1
+    jump: float = 2.0
+    sweeps: int = 4
+    halvings: int = 2
+
+    def same(self, one: End, other: End) -> bool:
+        """Return whether two solutions of one point are the same local optimum."""
+        a, b = np.asarray(self.signature(one)), np.asarray(self.signature(other))
+        near = np.abs(a - b) <= self.signature_tolerance * np.maximum(np.abs(a), np.abs(b))
+        apart = abs(one.cost - other.cost)
+        return bool(near.all()) and apart <= self.cost_tolerance * self.scale(other)
+
+
+@dataclass(frozen=True)
+class Attempt(Generic[End]):
+    """One solve.
+
+    Args:
+        name: Its name, unique in the exploration.
+        point: The point that it was made for.
+        end: Where it ended.
+    """
+
+    name: str
+    point: str
+    end: End
+
+
+@dataclass(frozen=True)
+class Branch(Generic[End]):
+    """A local optimum of a point.
+
+    Args:
+        number: Its number at the point, in the order in which they turned up, from 0.
+        name: Name of the solve.
+        end: The solution.
+        times: How many solves ended there.
+    """
+
+    number: int
+    name: str
+    end: End
+    times: int = 1
+
+
+@dataclass(frozen=True)
+class Exploration(Generic[End]):
+    """All local optima of all points.
+
+    Args:
+        branches: By point, best first; none where every solve failed.
+        attempts: Every solve, those at points in between and those that failed too.
+        sweeps: Sweeps that were made.
+        complete: Whether the last sweep found nothing new.
+    """
+
+    branches: dict[str, tuple[Branch[End], ...]]
+    attempts: tuple[Attempt[End], ...]
+    sweeps: int
+    complete: bool
+
+    def best(self, point: str) -> Branch[End] | None:
+        """Return the best local optimum of a point."""
+        return next(iter(self.branches[point]), None)
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Points without any solution."""
+        return tuple(point for point, known in self.branches.items() if not known)
 
 
 def explore(
     graph: Graph,
-    root: Found,
-    solve: Solve[Found],
-    rules: Rules[Found],
-    seeds: Mapping[str, Sequence[tuple[str, Found]]] | None = None,
-) -> Exploration[Found]:
+    root: End,
+    solve: Solve[End],
+    rules: Rules[End],
+    seeds: Mapping[str, Sequence[tuple[str, End]]] | None = None,
+) -> Exploration[End]:
     """Solve all points of a graph from one another.
 
     The names of solves depend on nothing but the way to them, so that a journal can be read.
@@ -62,42 +191,42 @@ def explore(
 
 
 @dataclass
-class _Explorer(Generic[Found]):
+class _Explorer(Generic[End]):
     """The state of an exploration."""
 
     graph: Graph
-    solve: Solve[Found]
-    rules: Rules[Found]
-    branches: dict[str, list[Branch[Found]]] = field(default_factory=dict)
-    attempts: list[Attempt[Found]] = field(default_factory=list)
+    solve: Solve[End]
+    rules: Rules[End]
+    branches: dict[str, list[Branch[End]]] = field(default_factory=dict)
+    attempts: list[Attempt[End]] = field(default_factory=list)
     tried: set[tuple[str, str, int]] = field(default_factory=set)
 
-    def ranked(self, point: str) -> list[Branch[Found]]:
+    def ranked(self, point: str) -> list[Branch[End]]:
         """Return the local optima of a point, best first."""
-        return sorted(self.branches.get(point, ()), key=lambda b: (b.found.cost, b.number))
+        return sorted(self.branches.get(point, ()), key=lambda b: (b.end.cost, b.number))
 
-    def keep(self, point: str, name: str, found: Found) -> bool:
+    def keep(self, point: str, name: str, end: End) -> bool:
         """Take note of a solution; return whether the point gained an optimum by it."""
         known = self.branches.setdefault(point, [])
         for i, branch in enumerate(known):
-            if self.rules.same(found, branch.found):
+            if self.rules.same(end, branch.end):
                 known[i] = replace(branch, times=branch.times + 1)
-                if found.cost < branch.found.cost:
-                    known[i] = replace(known[i], name=name, found=found)
+                if end.cost < branch.end.cost:
+                    known[i] = replace(known[i], name=name, end=end)
                 return False
-        known.append(Branch(len(known), name, found))
+        known.append(Branch(len(known), name, end))
         return True
 
-    def attempt(self, name: str, point: str, values: Values, start: Found) -> bool:
+    def attempt(self, name: str, point: str, values: Values, start: End) -> bool:
         """Solve a point from a start; return whether the point gained an optimum by it."""
-        found = self.solve(name, values, start)
-        self.attempts.append(Attempt(name, point, found))
-        return found.converged and self.keep(point, name, found)
+        end = self.solve(name, values, start)
+        self.attempts.append(Attempt(name, point, end))
+        return end.converged and self.keep(point, name, end)
 
     def reach(self, point: str) -> None:
         """Solve a point for the first time, from the best neighbour that leads there."""
         near = [p for p in self.graph.neighbours[point] if self.ranked(p)]
-        for source in sorted(near, key=lambda p: self.ranked(p)[0].found.cost):
+        for source in sorted(near, key=lambda p: self.ranked(p)[0].end.cost):
             self.follow(source, point)
             if self.ranked(point):
                 return
@@ -108,8 +237,8 @@ class _Explorer(Generic[Found]):
         self.tried.add((source, target, branch.number))
         name = f"{target}.from.{source}-{branch.number}"
         ends = tuple(np.asarray(self.graph.points[p]) for p in (source, target))
-        found = self._step(name, target, ends, (0.0, 1.0), branch.found, 0)
-        return found is not None and self.keep(target, name, found)
+        end = self._step(name, target, ends, (0.0, 1.0), branch.end, 0)
+        return end is not None and self.keep(target, name, end)
 
     def _step(
         self,
@@ -117,16 +246,16 @@ class _Explorer(Generic[Found]):
         target: str,
         ends: tuple[np.ndarray, ...],
         share: tuple[float, float],
-        start: Found,
+        start: End,
         level: int,
-    ) -> Found | None:
+    ) -> End | None:
         """Solve from one share of the way to another; None if even the smallest step fails."""
         label = name if share == (0.0, 1.0) else f"{name}.{share[0]:g}-{share[1]:g}"
         at = ends[1] if share[1] == 1.0 else ends[0] + share[1] * (ends[1] - ends[0])
-        found = self.solve(label, tuple(at.tolist()), start)
-        self.attempts.append(Attempt(label, target, found))
-        if found.converged:
-            return found
+        end = self.solve(label, tuple(at.tolist()), start)
+        self.attempts.append(Attempt(label, target, end))
+        if end.converged:
+            return end
         if level == self.rules.halvings:
             return None
         half = 0.5 * (share[0] + share[1])
@@ -149,15 +278,15 @@ class _Explorer(Generic[Found]):
         from_, to = self.ranked(source), self.ranked(target)
         if not from_ or (source, target, from_[0].number) in self.tried:
             return False
-        return all(self.rules.distance(from_[0].found, branch.found) > limit for branch in to)
+        return all(self.rules.distance(from_[0].end, branch.end) > limit for branch in to)
 
     def _usual_distance(self) -> float:
         """Return the median distance of neighbours."""
-        found = list(self._distances())
-        return float(np.median(found)) if found else 0.0
+        distances = list(self._distances())
+        return float(np.median(distances)) if distances else 0.0
 
     def _distances(self) -> Iterator[float]:
         for pair in self.graph.edges:
             one, other = (self.ranked(point) for point in pair)
             if one and other:
-                yield self.rules.distance(one[0].found, other[0].found)
+                yield self.rules.distance(one[0].end, other[0].end)

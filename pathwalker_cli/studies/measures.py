@@ -1,14 +1,27 @@
-"""What the neighbours of a study are compared by: cost and measures of the gait, SI units."""
+"""What neighbours are compared by: cost, measures of the gait and free numbers, SI units."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Final
 
+from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.resolve import Optimum
+from pathwalker_cli.model.numbers import Unknown
+from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measures_in, numbers_of
 from pathwalker_cli.stride.stride import stride_of
 
-__all__ = ["COMPARED", "all_measures", "measures"]
+__all__ = [
+    "COMPARED",
+    "Ranges",
+    "all_measures",
+    "free_units",
+    "measures",
+    "measures_with",
+    "range_content",
+    "ranges_of",
+]
 
 COMPARED: Final = (
     "cost",
@@ -18,6 +31,9 @@ COMPARED: Final = (
 )  # fmt: skip
 """The measures of table 5 of Sreenivasa et al. (2017)."""
 
+Ranges = Mapping[str, tuple[float, float]]
+"""Least and largest value of every spring and of every other number that is free, by name [SI]."""
+
 
 def all_measures(optimum: Optimum) -> dict[str, float]:
     """Return the cost and every single number of the gait."""
@@ -25,6 +41,36 @@ def all_measures(optimum: Optimum) -> dict[str, float]:
 
 
 def measures(optimum: Optimum) -> dict[str, float]:
-    """Return the measures that every study tells, as far as a neighbour has them."""
-    numbers = all_measures(optimum)
-    return {m.key: numbers[m.key] for m in measures_in("studies") if m.key in numbers}
+    """Return the measures that every study tells, then free numbers that are no springs."""
+    numbers, unknowns = all_measures(optimum), optimum.series.walker.unknowns
+    told = {m.key: numbers[m.key] for m in measures_in("studies") if m.key in numbers}
+    return told | {u.name: optimum.value(u) for u in unknowns if u.name not in STIFFNESSES}
+
+
+def free_units(unknowns: Sequence[Unknown]) -> dict[str, str]:
+    """Return the SI units of the unknowns beside the four springs, by name."""
+    return {u.name: u.unit for u in unknowns if u.name not in STIFFNESSES}
+
+
+def measures_with(units: Mapping[str, str]) -> tuple[Measure, ...]:
+    """Return the measures that every study tells, then free numbers by name and SI unit."""
+    words = {name: name.replace("_", " ") for name in units}
+    free = (Measure(name, words[name], unit, "", None) for name, unit in units.items())
+    return (*measures_in("studies"), *free)
+
+
+def ranges_of(optimum: Optimum) -> dict[str, tuple[float, float]]:
+    """Return the allowed range of every spring and unknown; none where it follows another one."""
+    ranges = dict(optimum.solver.bounds.ranges)
+    springs = STIFFNESSES if optimum.config.condition == "orthosis" else ()
+    if not all(name in ranges for name in springs):
+        values = zip(springs, optimum.stiffness.tolist(), strict=True)
+        ranges = {name: (value, value) for name, value in values} | ranges
+    return {name: ranges[name] for name in dict.fromkeys((*springs, *ranges))}
+
+
+def range_content(ranges: Ranges) -> dict[str, dict[str, tuple[float, float]]]:
+    """Return ranges as plain values, those of springs apart from others if there are any."""
+    springs = {name: pair for name, pair in ranges.items() if name in STIFFNESSES}
+    others = {name: pair for name, pair in ranges.items() if name not in STIFFNESSES}
+    return {"stiffness_ranges": springs, **({"number_ranges": others} if others else {})}

@@ -21,8 +21,8 @@ from pathwalker_cli.results.run_folder import (
     warm_start_run,
     write_run,
 )
-from pathwalker_cli.studies.verdict import Verdict, verdict_of
-from pathwalker_cli.studies.verdict_text import verdict_lines
+from pathwalker_cli.studies.judge import verdict_of
+from pathwalker_cli.studies.verdict import Verdict, verdict_lines
 
 __all__ = ["Outcome", "RunLog", "done_run", "run_study"]
 

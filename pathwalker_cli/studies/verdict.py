@@ -1,38 +1,36 @@
-"""How sure an identified number is: its limits, the cost around it, stops, and real springs."""
+"""How sure an identified number is: limits, cost around it, stops, real springs; in words."""
 
 from __future__ import annotations
 
-import itertools
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.conventions import SIDES, STIFFNESSES
+from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.gait.bounds import held
-from pathwalker_cli.gait.neighbourhood import Neighbourhood
-from pathwalker_cli.gait.resolve import Optimum, Resolver
-from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
+from pathwalker_cli.gait.solution import LocalOptimum
 from pathwalker_cli.io.refusals import dotted
 from pathwalker_cli.model.elements.orthosis import AnkleOrthosis
 from pathwalker_cli.model.numbers import Unknown
-from pathwalker_cli.patient.blocks import RealSpring
-from pathwalker_cli.results.text import end_of
-from pathwalker_cli.stride.series import GaitSeries
-from pathwalker_cli.studies.edges import Edge, find_edge
+from pathwalker_cli.results.text import angle_words
+from pathwalker_cli.stride.measures import measure_of
 
 __all__ = [
+    "PRESCRIBED",
     "SHARE",
     "NumberVerdict",
     "SnappedSprings",
     "StopVerdict",
     "Verdict",
-    "verdict_of",
+    "number_text",
+    "per_degree",
+    "reservations",
+    "snapped_warning",
+    "stop_text",
+    "verdict_lines",
     "verdict_of_metrics",
 ]
 
@@ -44,9 +42,6 @@ _DETERMINED: Final = 0.25
 
 _ROUGHLY: Final = 0.75
 """Share of the range of springs up to which a region still says something."""
-
-_CANDIDATES: Final = 2
-"""Real springs next to an identified stiffness that are considered."""
 
 
 @dataclass(frozen=True)
@@ -181,44 +176,6 @@ class Verdict:
         return plain
 
 
-def verdict_of(solution: GaitSolution) -> Verdict | None:
-    """Return the verdict on an identification, solving its neighbourhood.
-
-    Args:
-        solution: A converged solution by collocation.
-
-    Returns:
-        None where there is no number to judge: nothing free to choose, half a cycle (where both
-        sides are one), or a solution that is not one.
-    """
-    config = solution.config
-    if not solution.converged or not solution.walker.unknowns:
-        return None
-    if config.half_cycle or config.transcription != "collocation":
-        return None
-    began = time.perf_counter()
-    resolver = Resolver(solution.case, solution.last_motion, solution.nlp.multipliers)
-    judge = _Judge(resolver)
-    if not judge.around.free or not judge.optimum.converged:
-        return None
-    verdicts = {unknown: judge.number(unknown) for unknown in judge.optimum.solver.walker.unknowns}
-    springs = tuple(_springs(verdicts))
-    names = {spring.name for spring in springs}
-    snapped = judge.snapped()
-    near = [o for o in solution.optima if o.converged]
-    best = min((o.cost for o in near), default=0.0)
-    return Verdict(
-        springs=springs,
-        numbers=tuple(v for u, v in verdicts.items() if not names.intersection(_full_names(u))),
-        stops=tuple(_stops(judge.optimum.series)),
-        snapped=snapped,
-        optima=tuple(o for o in near if o.cost <= best + SHARE * abs(best)),
-        starts=len(near),
-        solves=judge.solves,
-        seconds=time.perf_counter() - began,
-    )
-
-
 def verdict_of_metrics(metrics: Mapping[str, Any]) -> Verdict | None:
     """Return the verdict that the metrics of a run hold, None without one.
 
@@ -278,149 +235,168 @@ def _contradiction(verdict: Verdict) -> str:
     return ""
 
 
-class _Judge:
-    """Solves around an optimum."""
+_BEATEN: Final = 1e-3
+"""Share of the cost by which real springs must be cheaper than the optimum to say so."""
 
-    def __init__(self, resolver: Resolver) -> None:
-        self.resolver = resolver
-        self.around = Neighbourhood(resolver)
-        self.optimum = self.around.optimum
-        self.solves = 0
+PRESCRIBED: Final = "prescribed by the config, not identified"
 
-    @property
-    def config(self) -> StudyConfig:
-        """The config of the optimum."""
-        return self.optimum.config
+_SOFTER: Final = {"lower": ("softer", -1.0), "upper": ("stiffer", 1.0)}
+_WIDTH: Final = "rad wide"
+_LESS: Final = {"lower": ("less", -1.0), "upper": ("more", 1.0)}
+_TURNED: Final = {"lower": ("towards dorsiflexion", -1.0), "upper": ("towards plantarflexion", 1.0)}
 
-    def number(self, unknown: Unknown) -> NumberVerdict:
-        """Return the verdict on one number."""
-        value, limits = self.optimum.value(unknown), self.optimum.range(unknown)
-        about = (unknown.name, unknown.label, unknown.unit, value)
-        tied = len(unknown.numbers) > 1
-        if unknown not in self.around.free:
-            only = (value, value)
-            return NumberVerdict(
-                *about, only, "", 0.0, 0.0, only, (True, True), certain=True, tied=tied
-            )
-        which = self.around.free.index(unknown)
-        size = abs(self.optimum.cost)
-        gradient = float(self.around.cost_gradient[which]) / size
-        curvature = self.around.curvature(unknown) / size
-        limit = end_of(value, limits)
-        edges = []
-        for end, sign in zip(limits, (-1.0, 1.0), strict=True):
-            if limit == {-1.0: "lower", 1.0: "upper"}[sign]:
-                edges.append(Edge(end, True, 0.0, True, 0, 0))
-                continue
-            step = _quadratic_edge(sign * gradient if limit else 0.0, curvature)
-            edges.append(self._edge(unknown, value, end, step, not limit))
-        return NumberVerdict(
-            *about,
-            limits,
-            limit,
-            gradient if limit else 0.0,
-            curvature,
-            (edges[0].value, edges[1].value),
-            (edges[0].limit, edges[1].limit),
-            all(edge.certain for edge in edges),
-            (edges[0].again, edges[1].again),
-            tied,
+
+def verdict_lines(verdict: Verdict) -> Iterator[tuple[str, str]]:
+    """Yield label and text of every line."""
+    for number in (*verdict.springs, *verdict.numbers):
+        yield number.label, number_text(number)
+    reached = [stop for stop in verdict.stops if stop.excess > 0.0]
+    yield "hard stops", "; ".join(map(stop_text, reached)) or "none is reached"
+    if verdict.starts > 1:
+        yield "other optima", _optima(verdict)
+    else:
+        yield "other optima", "not searched for: `starts: 8` looks from several starts"
+    yield "real springs", _snapped(verdict)
+    yield "verdict", f"{verdict.solves} problems solved around the optimum, {verdict.seconds:.1f} s"
+
+
+def per_degree(stiffness: float) -> float:
+    """Return a stiffness in N m/deg from N m/rad."""
+    return float(np.deg2rad(stiffness))
+
+
+def shown(value: float, unit: str, second: bool = True) -> str:
+    """Return a number in the units in which people have it: angles in degrees.
+
+    Args:
+        value: The number [unit].
+        unit: SI unit, see `_unit`; an angle is one of the ankle, + = plantarflexion.
+        second: Whether a stiffness is also given per degree, an angle with its direction.
+    """
+    if unit == _WIDTH:
+        return f"{float(to_degrees(value)):.1f} deg"
+    if unit == "rad":
+        return angle_words(value) if second else f"{float(to_degrees(abs(value))):.1f} deg"
+    if unit == "N m/rad":
+        each = f" ({per_degree(value):.2f} N m/deg)" if second else ""
+        return f"{value:.1f} N m/rad{each}"
+    return f"{value:.3g} {unit}"
+
+
+def _unit(number: NumberVerdict) -> str:
+    """Return the unit of a number, that of a width where it is an angle without direction."""
+    return _WIDTH if number.name.startswith("free_play") else number.unit
+
+
+def _span(low: float, high: float, unit: str) -> str:
+    """Return a range like `shown`."""
+    if unit in ("rad", _WIDTH):
+        return f"{shown(low, unit)} to {shown(high, unit)}"
+    if unit == "N m/rad":
+        return (
+            f"{low:.1f} to {high:.1f} N m/rad ({per_degree(low):.2f} to {per_degree(high):.2f} "
+            "N m/deg)"
         )
+    return f"{low:.3g} to {high:.3g} {unit}"
 
-    def _edge(self, unknown: Unknown, start: float, end: float, step: float, look: bool) -> Edge:
-        """Return an edge; a cost that slopes from a limit is not searched for another basin."""
 
-        def solve(value: float, near: Optimum, insist: bool) -> Optimum:
-            return self._solved({unknown: value}, near, insist)
+def number_text(number: NumberVerdict) -> str:
+    """Return what is known of a number."""
+    unit = _unit(number)
+    value = shown(number.value, unit)
+    if number.prescribed:
+        return f"{value}: {PRESCRIBED}"
+    what = "springs that are" if number.unit == "N m/rad" else "range that is"
+    text = (
+        f"{value}: {number.determined}; the cost stays within {100 * SHARE:g} % of the best from "
+        f"{_span(*number.region, unit)}, {100 * number.width:.0f} % of the {what} allowed"
+    )
+    both = ["both sides are one number"] if number.tied else []
+    return "; ".join([text, *both, *reservations(number)])
 
-        edge = find_edge(solve, self.optimum, start, end, SHARE, step, look)
-        self.solves += edge.solves
-        return edge
 
-    def _solved(
-        self, values: Mapping[Unknown, float], start: Optimum | None = None, insist: bool = True
-    ) -> Optimum:
-        """Return the neighbour with some numbers prescribed."""
-        case = self.optimum.case.with_values(held(self.config, values))
-        return self.resolver.resolve(case, start, insist)
-
-    def snapped(self) -> SnappedSprings | None:
-        """Return the best choice among the springs that exist, solved again."""
-        orthosis = self.optimum.solver.walker.patient.orthosis
-        if orthosis is None or orthosis.springs is None:
-            return None
-        kinds = {u: u.numbers[0].name.removesuffix("_stiffness") for u in self.around.free}
-        springs = [u for u, kind in kinds.items() if hasattr(orthosis.springs, kind)]
-        if not springs:
-            return None
-        lists = [
-            _nearest(
-                getattr(orthosis.springs, kinds[u]), self.optimum.value(u), self.optimum.range(u)
-            )
-            for u in springs
-        ]
-        choices = [dict(zip(springs, choice, strict=True)) for choice in itertools.product(*lists)]
-        best = min(choices, key=self._estimate)
-        found = self._solved({u: spring.stiffness for u, spring in best.items()})
-        self.solves += 1
-        rise = self._estimate(best)
-        if found.converged:
-            rise = found.cost - self.optimum.cost
-        series = found.series
-        each = {name: spring for u, spring in best.items() for name in _full_names(u)}
-        return SnappedSprings(
-            {name: spring.name for name, spring in each.items()},
-            {name: spring.stiffness for name, spring in each.items()},
-            rise / abs(self.optimum.cost),
-            series.distance / series.duration,
-            found.result.status,
+def reservations(number: NumberVerdict) -> Iterator[str]:
+    """Yield what to know of a number beside its region: other optima, limits, doubts."""
+    if number.prescribed:
+        return
+    far = [end for end, again in zip(number.range, number.again, strict=True) if again]
+    if far:
+        ends = " and ".join(shown(end, _unit(number), number.unit == "rad") for end in far)
+        ends = ends.replace(" N m/rad and", " and")
+        yield f"the cost is as good again at {ends}, another local optimum"
+    if number.limit:
+        words = {"N m/rad": _SOFTER, "rad": _TURNED}
+        word, sign = words.get(_unit(number), _LESS)[number.limit]
+        step = _noticeable(number)
+        saved = -100.0 * sign * number.gradient * step
+        yield (
+            f"it sits at the {number.limit} limit: {shown(step, _unit(number), second=False)} "
+            f"{word} would save about {saved:.2g} % more"
         )
+    if not number.certain:
+        yield "the ends of this region are not certain: the problems beyond did not converge"
 
-    def _estimate(self, choice: Mapping[Unknown, RealSpring]) -> float:
-        """Return the rise of the cost to second order."""
-        return self.around.rise(
-            {u: spring.stiffness - self.optimum.value(u) for u, spring in choice.items()}
+
+def _noticeable(number: NumberVerdict) -> float:
+    """Return a step that makes a difference to a hand: a tenth of the number, or a degree."""
+    return float(np.deg2rad(1.0)) if number.unit == "rad" else 0.1 * abs(number.value)
+
+
+def stop_text(stop: StopVerdict) -> str:
+    """Return how far and how long the ankle goes beyond a stop."""
+    return (
+        f"{stop.side} {stop.stop} stop ({to_degrees(abs(stop.angle)):.1f} deg) exceeded by "
+        f"{to_degrees(stop.excess):.1f} deg, {100 * stop.share:.0f} % of the stride"
+    )
+
+
+def _optima(verdict: Verdict) -> str:
+    others = verdict.optima[1:]
+    text = f"{len(others)} of {verdict.starts - 1} other starts end within {100 * SHARE:g} %"
+    if not others:
+        return text
+    spread = []
+    for spring in verdict.springs:
+        if spring.prescribed:
+            continue
+        row = STIFFNESSES.index(spring.name)
+        values = [optimum.stiffness[row] for optimum in verdict.optima]
+        spread.append(f"{measure_of(spring.name).label} {min(values):.0f} to {max(values):.0f}")
+    return f"{text}, with {', '.join(spread)} N m/rad"
+
+
+def snapped_warning(verdict: Verdict) -> str:
+    """Return what to beware of with the real springs; "" where there is nothing.
+
+    They may cost less than the optimum, which is then not the best one, or far more.
+    """
+    snapped = verdict.snapped
+    if snapped is None:
+        return ""
+    if snapped.status == "converged" and snapped.rise <= -_BEATEN:
+        return (
+            "WARNING: that is less than the optimum found, which is therefore not the best one; "
+            "`starts: 8` looks for better ones"
         )
+    if snapped.rise > SHARE:
+        return (
+            f"WARNING: {100 * snapped.rise:.2g} % above the springs found, to which all figures "
+            "belong; none that is listed and allowed comes near: prescribe these and solve again"
+        )
+    return ""
 
 
-def _full_names(unknown: Unknown) -> tuple[str, ...]:
-    return tuple(number.full_name for number in unknown.numbers)
-
-
-def _springs(verdicts: Mapping[Unknown, NumberVerdict]) -> Iterator[NumberVerdict]:
-    """Yield the verdict on every spring, in order; tied ones share theirs."""
-    of = {name: (u, v) for u, v in verdicts.items() for name in _full_names(u)}
-    for name in STIFFNESSES:
-        if name in of:
-            unknown, verdict = of[name]
-            number = next(n for n in unknown.numbers if n.full_name == name)
-            yield replace(verdict, name=name, label=Unknown.of(number).label)
-
-
-def _quadratic_edge(slope: float, curvature: float) -> float:
-    """Return the distance at which slope d + curvature d^2 / 2 reaches `SHARE` [N m/rad]."""
-    slope, curvature = max(slope, 0.0), max(curvature, 1e-9)
-    return float((np.sqrt(slope**2 + 2.0 * curvature * SHARE) - slope) / curvature)
-
-
-def _nearest(
-    springs: Sequence[RealSpring], stiffness: float, allowed: tuple[float, float]
-) -> list[RealSpring]:
-    """Return the real springs next to a stiffness, if possible those that are allowed."""
-    within = [spring for spring in springs if allowed[0] <= spring.stiffness <= allowed[1]]
-    by_distance = sorted(within or springs, key=lambda spring: abs(spring.stiffness - stiffness))
-    return by_distance[:_CANDIDATES]
-
-
-def _stops(series: GaitSeries) -> Iterator[StopVerdict]:
-    """Yield how far the ankles go into every hard stop."""
-    weights, walker = series.quadrature, series.walker
-    for side, element in walker.device.elements.items():
-        fixed, angle = element.fixed(walker.values), series.column(*element.coordinates)
-        for stop, limit, sign in (
-            ("dorsiflexion", fixed.dorsiflexion_stop, -1.0),
-            ("plantarflexion", fixed.plantarflexion_stop, 1.0),
-        ):
-            beyond = sign * (angle - limit)
-            share = float(weights @ (beyond > 0.0) / weights.sum())
-            yield StopVerdict(side, stop, float(limit), float(beyond.max()), share)
+def _snapped(verdict: Verdict) -> str:
+    snapped = verdict.snapped
+    if snapped is None:
+        return "the patient's file lists none (orthosis.springs)"
+    chosen = ", ".join(
+        f"{measure_of(name).label} {snapped.names[name]} ({stiffness:.1f} N m/rad, "
+        f"{per_degree(stiffness):.2f} N m/deg)"
+        for name, stiffness in snapped.stiffness.items()
+    )
+    text = f"{chosen}: cost {100 * snapped.rise:+.2g} %, {snapped.walking_speed:.3f} m/s"
+    if snapped.status != "converged":
+        rise = f"{100 * snapped.rise:+.2g} %"
+        text = f"{chosen}: estimated cost {rise} (solving it: {snapped.status})"
+    return "; ".join(filter(None, (text, snapped_warning(verdict))))

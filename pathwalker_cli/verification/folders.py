@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from pathwalker_cli.io.csv_file import read_rows
-from pathwalker_cli.studies.batch.ledger import CASES, TABLE
-from pathwalker_cli.studies.batch.table import numbers_of, read_metrics
+from pathwalker_cli.studies.batch.ledger import CASES, TABLE, numbers_of, read_metrics
 from pathwalker_cli.verification.checks import Check, Verification
 
 __all__ = ["runs_in", "verify_table"]

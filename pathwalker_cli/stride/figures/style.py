@@ -33,6 +33,7 @@ __all__ = [
     "new_figure",
     "percent_axis",
     "side_handles",
+    "side_look",
     "toe_off_line",
     "zero_line",
 ]
@@ -121,6 +122,12 @@ def side_handles() -> list[Artist]:
 def events_handle() -> Artist:
     """Return the legend entry of the toe-off marks."""
     return Line2D([], [], color=NEUTRAL, linewidth=0.6, label="upright: toe-off")
+
+
+def side_look(name: str) -> tuple[str, str]:
+    """Return colour and marker of the side that a name tells of; grey triangles for none."""
+    side = next((side for side in SIDES if side in name), None)
+    return (LINE_COLOUR[side], MARKER[side]) if side else (NEUTRAL, "^")
 
 
 def band_handle() -> Artist:

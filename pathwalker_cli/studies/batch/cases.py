@@ -1,7 +1,8 @@
-"""From the file of a study to its cases: every patient, problem and override, by name."""
+"""From the file of a study to its cases: every patient, problem and override, by name, checked."""
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -9,14 +10,35 @@ from pathlib import Path
 from typing import Any
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.config import StudyConfig, place_of, with_values
-from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.studies.batch.checks import check_case, check_warm_start
-from pathwalker_cli.studies.batch.names import case_name, short_keys
-from pathwalker_cli.studies.batch.people import listed_patients, listed_problems
-from pathwalker_cli.studies.batch.schema import BatchStudy, NamedCase, flat, load_batch
+from pathwalker_cli.config import StudyConfig, find_config, load_config, place_of, with_values
+from pathwalker_cli.errors import ConfigError, InputError, PatientError, placed
+from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.recorded import recorded_passage, recorded_stride, start_recording
+from pathwalker_cli.gait.symmetry import require_symmetry
+from pathwalker_cli.model.walker import Walker
+from pathwalker_cli.patient import Patient, load_patient, shipped_patients
+from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.results.run_folder import warm_start_run
+from pathwalker_cli.studies.batch.schema import (
+    BatchStudy,
+    NamedCase,
+    case_name,
+    flat,
+    load_batch,
+    short_keys,
+    slug,
+)
 
-__all__ = ["Batch", "BatchCase", "load_cases"]
+__all__ = [
+    "Batch",
+    "BatchCase",
+    "check_case",
+    "check_patient",
+    "check_warm_start",
+    "listed_patients",
+    "listed_problems",
+    "load_cases",
+]
 
 
 @dataclass(frozen=True)
@@ -156,3 +178,172 @@ def _warm_starts(
         found[name] = (source.parent / folder).resolve()
         check_warm_start(found[name], problems[name], place)
     return found
+
+
+def listed_patients(
+    entries: tuple[str, ...], folder: Path, source: Path, where: str
+) -> dict[str, Patient]:
+    """Return all patients by what a config calls them: a shipped id or a full path.
+
+    Args:
+        entries: Shipped ids, files, folders and patterns.
+        folder: Folder that they are relative to.
+        source: The study's file, which is no patient.
+        where: The study, for messages.
+
+    Raises:
+        ConfigError: If an entry leads to nobody, or to somebody who is there already.
+        PatientError: If the file of a patient is refused.
+    """
+    found: dict[str, Patient] = {}
+    owners: dict[str, str] = {}
+    for entry in entries:
+        for name in _names(entry, folder, source, f"{where}: patients"):
+            patient = load_patient(name)
+            if name in found:
+                what = f"'{entry}' leads to {name}, which is listed already"
+                raise ConfigError(what, where=f"{where}: patients", mend="list it once")
+            if patient.id in owners:
+                what = f"{name} and {owners[patient.id]} have the same id, {patient.id}"
+                mend = "give one of them another id"
+                raise ConfigError(what, where=f"{where}: patients", mend=mend)
+            found[name], owners[patient.id] = patient, name
+    return found
+
+
+def _names(entry: str, folder: Path, source: Path, where: str) -> Iterator[str]:
+    """Yield what an entry leads to, in order of the names."""
+    if entry in shipped_patients():
+        yield entry
+        return
+    pattern = any(mark in entry for mark in "*?[")
+    paths = glob.glob(entry, root_dir=folder, recursive=True) if pattern else [entry]
+    files = [file for path in sorted(paths) for file in _files((folder / path).resolve())]
+    files = [file for file in files if file != source]
+    if not files:
+        raise ConfigError(
+            f"'{entry}' leads to no patient",
+            where=where,
+            allowed=f"{', '.join(shipped_patients())}, or a YAML file, a folder or a pattern such "
+            "as children/*.yaml, relative to the study's file",
+        )
+    yield from map(str, files)
+
+
+def _files(path: Path) -> list[Path]:
+    """Return the file of a patient, or all files of patients in a folder."""
+    if not path.is_dir():
+        return [path] if path.exists() else []
+    if (path / "patient.yaml").is_file():
+        return [path / "patient.yaml"]
+    return sorted([*path.glob("*.yaml"), *path.glob("*/patient.yaml")])
+
+
+def listed_problems(entries: tuple[str, ...], folder: Path, where: str) -> dict[str, StudyConfig]:
+    """Return the config of every problem by its name, which is that of its file.
+
+    Args:
+        entries: Names of shipped configs, or config files.
+        folder: Folder that they are relative to.
+        where: The study, for messages.
+
+    Raises:
+        ConfigError: If a config is missing or refused, or a name stands twice.
+    """
+    found: dict[str, StudyConfig] = {}
+    for entry in entries:
+        beside = folder / entry
+        path = beside if beside.is_file() else find_config(Path(entry))
+        if not path.is_file():
+            raise ConfigError(
+                f"'{entry}' is no config of a problem",
+                where=f"{where}: problems",
+                allowed=f"{', '.join(PROBLEMS)}, or a YAML file relative to the study's file",
+            )
+        name = slug(path.stem)
+        if name in found:
+            raise ConfigError(
+                f"two problems are named {name}",
+                where=f"{where}: problems",
+                mend="list one of them, or rename its file",
+            )
+        found[name] = load_config(path)
+    return found
+
+
+def check_case(name: str, case: Case, where: str) -> None:
+    """Refuse a case that could not even begin.
+
+    Args:
+        name: Its name, for the message.
+        case: Config and patient.
+        where: The study, for the message.
+
+    Raises:
+        InputError: If the patient lacks what the problem needs, or a value does not fit.
+    """
+    config = case.config
+    with placed(f"{where}, case {name}"):
+        check_patient(case)
+        _check_starts(config)
+        walker = case.walker(config.model.backend)
+        gait_bounds(walker, config.bounds, config.free)
+        _check_start(config, walker)
+
+
+def check_patient(case: Case) -> None:
+    """Refuse a patient without what the problem needs.
+
+    Raises:
+        PatientError: If orthosis or strengths lack.
+    """
+    config, patient = case.config, case.unvaried
+    if config.condition == "orthosis" and patient.orthosis is None:
+        raise PatientError(
+            f"patient {patient.id} has no orthosis, which problem {config.problem} needs",
+            where=str(patient.source),
+            mend="add the orthosis to the file, or choose a barefoot problem for this patient",
+        )
+    _ = patient.max_isometric_torque
+
+
+def _check_starts(config: StudyConfig) -> None:
+    """Refuse a config for several processes.
+
+    Raises:
+        ConfigError: If so.
+    """
+    if config.starts > 1:
+        raise ConfigError(
+            f"is {config.starts}",
+            where="starts",
+            allowed="1, as the cores belong to the cases",
+            mend="spread the starts as cases, e.g. grid: {start.knee_flexion: [0.5, 0.7, 0.9]}",
+        )
+
+
+def _check_start(config: StudyConfig, walker: Walker) -> None:
+    """Refuse half a cycle of unequal sides, and a recorded start without a recording.
+
+    Raises:
+        InputError: If so.
+    """
+    if config.half_cycle:
+        require_symmetry(walker)
+    if config.start.gait == "recorded":
+        recording = start_recording(walker, config.start)
+        (recorded_passage if config.fits else recorded_stride)(walker, recording)
+
+
+def check_warm_start(folder: Path, config: StudyConfig, where: str) -> None:
+    """Refuse an earlier run that the cases of a problem cannot begin with.
+
+    Raises:
+        InputError: If it is missing, damaged, not converged or about something else.
+    """
+    try:
+        warm_start_run(folder, config)
+    except InputError as error:
+        inner = error.where.removeprefix("--warm-start").strip()
+        place = f"{where}: {inner}" if inner else where
+        raise error.at(place) from None

@@ -1,26 +1,161 @@
-"""What is known of every case of a study, kept on disk after each of them."""
+"""What is known of every case of a study: the table of all, kept on disk after each of them."""
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
+from pydantic import BaseModel
+
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.csv_file import read_cells, write_table
+from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.results.tables import DIGITS
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.batch.cases import BatchCase
-from pathwalker_cli.studies.batch.table import (
-    CONVERGED,
-    PENDING,
-    CaseTable,
-    read_metrics,
-)
 from pathwalker_cli.studies.batch.worker import Result
 from pathwalker_cli.studies.run import done_run
 
-__all__ = ["CASES", "ENTRIES", "TABLE", "Ended", "Ledger"]
+__all__ = [
+    "CASES",
+    "CONVERGED",
+    "ENTRIES",
+    "PENDING",
+    "TABLE",
+    "CaseTable",
+    "Ended",
+    "Ledger",
+    "numbers_of",
+    "read_metrics",
+    "unit_of",
+]
+
+CONVERGED: Final = "converged"
+PENDING: Final = "not yet run"
+"""Status of a case whose turn has not come."""
+
+_PROOF: Final = {
+    "largest_violation": "",
+    "reintegration_position_error": "rad or m",
+    "reintegration_velocity_error": "rad/s or m/s",
+    "intervals": "",
+    "iterations": "",
+}
+"""Metrics of every case that was solved, converged or not."""
+
+
+class CaseTable:
+    """Headers and rows of the cases of one study.
+
+    Args:
+        cases: All cases in order.
+    """
+
+    def __init__(self, cases: Sequence[BatchCase]) -> None:
+        self._named = any(case.variant for case in cases)
+        varied = {key: unit_of(key) for case in cases[:1] for key in case.values}
+        columns = {"case": "", "patient": "", "problem": "", **varied}
+        columns |= {"variant": ""} if self._named else {}
+        gait = {m.key: "" if m.unit == "1" else m.unit for m in measures_in("batch")}
+        columns |= {"status": "", **gait, **_PROOF}
+        self.header = [f"{name} [{unit}]" if unit else name for name, unit in columns.items()]
+
+    def row(
+        self, case: BatchCase, status: str, metrics: Mapping[str, Any] | None = None
+    ) -> tuple[str, ...]:
+        """Return the row of a case.
+
+        Args:
+            case: The case.
+            status: "converged", or why not.
+            metrics: Content of the run's `metrics.json`; None if there is no run.
+        """
+        row = [case.name, case.patient, case.problem, *map(_varied, case.values.values())]
+        row += [case.variant] if self._named else []
+        return (*row, status, *numbers_of(status, metrics).values())
+
+
+def numbers_of(status: str, metrics: Mapping[str, Any] | None) -> dict[str, str]:
+    """Return the numbers in the row of a case, as text by heading without unit.
+
+    Args:
+        status: "converged", or why not.
+        metrics: Content of the run's `metrics.json`; None if there is no run.
+    """
+    found = metrics or {}
+    gait = found if status == CONVERGED else {}  # a last iterate is no gait
+    numbers = {m.key: gait.get(m.key) for m in measures_in("batch")}
+    numbers |= {name: found.get(name) for name in _PROOF}
+    return {name: _number(value) for name, value in numbers.items()}
+
+
+def read_metrics(folder: Path) -> dict[str, Any] | None:
+    """Return the metrics in a run folder; None if they are not there."""
+    try:
+        content = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) and "status" in content else None
+
+
+def _varied(value: Any) -> str:
+    """Return a varied value as it stands in the table."""
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def _number(value: Any) -> str:
+    """Return a number as text, "" where there is none."""
+    return f"{value:.{DIGITS}g}" if isinstance(value, int | float) else ""
+
+
+def unit_of(key: str) -> str:
+    """Return the unit of a config value by its dotted key; "" if it has none or it is not known.
+
+    Args:
+        key: E.g. "bounds.least_walking_speed", or "variation.shift." and a place in the patient's
+            file.
+    """
+    block, kind, place = (*key.split(".", 2), "", "")[:3]
+    if block == "variation" and place:
+        return _unit(Patient, place.split(".")) if kind == "shift" else "1"
+    return _unit(StudyConfig, key.split("."))
+
+
+def _unit(annotation: Any, path: list[str]) -> str:
+    """Return the unit at a path below an annotation."""
+    quantity = next((a for a in getattr(annotation, "__metadata__", ()) if _is_quantity(a)), None)
+    if quantity is not None and not path:
+        return quantity.unit or "1"
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return _below(annotation, path)
+    inner = get_args(annotation)
+    steps = path[1:] if getattr(annotation, "__origin__", None) is dict else path
+    found = (_unit(argument, steps) for argument in inner)
+    return next((unit for unit in found if unit), "")
+
+
+def _below(model: type[BaseModel], path: list[str]) -> str:
+    """Return the unit at a path below a model; both sides of a body have the same."""
+    fields = model.model_fields
+    name, rest = (path[0], path[1:]) if path else ("right", [])
+    if name not in fields:
+        return ""
+    field = fields[name]
+    quantity = next((a for a in field.metadata if _is_quantity(a)), None)
+    if quantity is not None and not rest:
+        return quantity.unit or "1"
+    return _unit(field.annotation, rest)
+
+
+def _is_quantity(value: Any) -> bool:
+    return isinstance(value, Quantity)
+
 
 CASES: Final = "cases"
 TABLE: Final = "cases.csv"

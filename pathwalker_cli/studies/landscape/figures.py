@@ -46,11 +46,7 @@ _FLAT: Final = 1e-3
 
 
 def landscape_figure(landscape: Landscape) -> Figure:
-    """Return the figure of a landscape.
-
-    Args:
-        landscape: The landscape.
-    """
+    """Return the figure of a landscape."""
     with mpl.rc_context(STYLE):
         fig = new_figure(5.9)
         panels = fig.subplot_mosaic([["cost", "cost"], ["a", "b"], ["c", "legend"]],
@@ -102,13 +98,8 @@ def _mark_real(ax: Axes, springs: SpringSet) -> None:
     ax.plot([right] * len(k_p), k_p, **_REAL_P, **look)
 
 
-def save_landscape_figure(folder: Path, landscape: Landscape) -> None:
-    """Save the figure of a landscape as PNG and SVG.
-
-    Args:
-        folder: Where.
-        landscape: The landscape.
-    """
+def save_landscape_figure(landscape: Landscape, folder: Path) -> None:
+    """Save the figure of a landscape as PNG and SVG."""
     save_formats(landscape_figure(landscape), folder, "landscape")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final
 
@@ -27,7 +27,7 @@ class Point:
         status: "converged" or the reason why not.
         iterations: Iterations of the solve.
         seconds: Wall seconds of it.
-        measures: Numbers of `MEASURES`, SI units; none if it did not converge.
+        measures: Measures and free numbers, SI units; none if it did not converge.
         times: How many solves ended there.
     """
 
@@ -88,6 +88,7 @@ class Landscape:
         seconds: Wall seconds of all of them.
         sweeps: Sweeps over the grid.
         complete: Whether the last sweep found nothing new.
+        further: SI units of the unknowns beside the springs, by name.
     """
 
     patient: str
@@ -107,6 +108,7 @@ class Landscape:
     seconds: float
     sweeps: int
     complete: bool
+    further: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def best(self) -> Point:

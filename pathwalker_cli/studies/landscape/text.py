@@ -1,14 +1,99 @@
-"""A landscape in plain words on the terminal."""
+"""A landscape as files and in plain words on the terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
+from pathwalker_cli.io.csv_file import write_table
+from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.studies.landscape.result import Landscape, Point, Region
+from pathwalker_cli.studies.measures import measures_with
 
-__all__ = ["landscape_lines"]
+__all__ = ["FILES", "landscape_content", "landscape_lines", "write_tables"]
+
+FILES: Final = ("landscape.csv", "landscape.json")
+
+
+def write_tables(landscape: Landscape, folder: Path) -> None:
+    """Write every local optimum as a row, and the result in short."""
+    measures = measures_with(landscape.further)
+    header = ("point", "dorsiflexion_stiffness [N m/rad]", "plantarflexion_stiffness [N m/rad]",
+              "branch", "status", "cost_increase [1]", *(measure.column for measure in measures),
+              "solves", "iterations", "seconds")  # fmt: skip
+    rows, least = [], landscape.best.cost
+    for point in landscape.points:
+        more = (point.cost - least) / abs(least) if np.isfinite(point.cost) else None
+        numbers = [point.measures.get(measure.key) for measure in measures]
+        rows.append((point.name, point.k_d, point.k_p, point.branch, point.status, more, *numbers,
+                     point.times, point.iterations, point.seconds))  # fmt: skip
+    write_table(folder / FILES[0], header, rows)
+    write_json(folder / FILES[1], landscape_content(landscape))
+
+
+def landscape_content(landscape: Landscape) -> dict[str, Any]:
+    """Return the content of the summary."""
+    return {
+        "problem": landscape.problem,
+        "patient": landscape.patient,
+        "side": landscape.side,
+        "dorsiflexion_stiffness": landscape.k_d.tolist(),
+        "plantarflexion_stiffness": landscape.k_p.tolist(),
+        "best": _point_content(landscape.best),
+        "start": _point_content(landscape.optimum),
+        "released": None if landscape.released is None else _point_content(landscape.released),
+        "better_than_start": landscape.better_than_start,
+        "tolerance": landscape.tolerance,
+        "region": _region_content(landscape.region),
+        "reintegration": {
+            name: {"position": _number(q), "velocity": _number(v)}
+            for name, (q, v) in landscape.checks.items()
+        },
+        "reintegration_allowed": dict(
+            zip(("position", "velocity"), landscape.allowed, strict=True)
+        ),
+        "grid_points": len(landscape.bests),
+        "failed_points": [point.name for point in landscape.failed],
+        "points_with_several_optima": [point.name for point in landscape.branched],
+        "solves": landscape.solves,
+        "failed_solves": landscape.failed_solves,
+        "median_iterations": float(np.median(landscape.iterations)),
+        "seconds": landscape.seconds,
+        "sweeps": landscape.sweeps,
+        "sweeps_found_nothing_new": landscape.complete,
+    }
+
+
+def _region_content(region: Region | None) -> dict[str, Any] | None:
+    """Return a region as plain values."""
+    if region is None:
+        return None
+    return {
+        "dorsiflexion_stiffness": list(region.k_d),
+        "plantarflexion_stiffness": list(region.k_p),
+        "share_of_points": region.share,
+        "points": region.points,
+        "reaches": list(region.ends),
+    }
+
+
+def _point_content(point: Point) -> dict[str, Any]:
+    """Return a point as plain values."""
+    return {
+        "point": point.name,
+        "status": point.status,
+        "dorsiflexion_stiffness": _number(point.k_d),
+        "plantarflexion_stiffness": _number(point.k_p),
+        "measures": dict(point.measures),
+    }
+
+
+def _number(value: float) -> float | None:
+    """Return a number, None for what is none: JSON knows no NaN."""
+    return value if np.isfinite(value) else None
 
 
 def landscape_lines(landscape: Landscape) -> list[str]:

@@ -22,11 +22,11 @@ from pathwalker_cli.stride.figures.style import (
     dress,
     legend,
     new_figure,
+    side_look,
 )
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
-from pathwalker_cli.studies.perturbation.text import paper_changes
 
 __all__ = ["perturbation_figure", "save_perturbation_figure"]
 
@@ -58,10 +58,9 @@ def perturbation_figure(result: Perturbation) -> Figure:
 
 
 def _label(result: Perturbation, row: Perturbed) -> str:
-    """Return the name of a spring with both its stiffnesses."""
-    symbol, side = measure_of(row.spring).label.split()
-    name = f"{symbol} {side}, {100.0 * (row.factor - 1.0):+.3g} %"
-    return f"{name}\n{result.base[row.spring]:.3g} to {row.stiffness:.3g} N m/rad"
+    """Return the name of a number with both its values."""
+    name = f"{row.label}, {100.0 * (row.factor - 1.0):+.3g} %"
+    return f"{name}\n{result.optimum[row.name]:.3g} to {row.value:.3g} {row.unit}"
 
 
 def _draw(ax: Axes, result: Perturbation, key: str) -> None:
@@ -69,15 +68,14 @@ def _draw(ax: Axes, result: Perturbation, key: str) -> None:
     ax.axvline(0.0, color=NEUTRAL, linewidth=0.6)
     shown = [0.0]
     for y, row in enumerate(result.rows):
-        side = next(side for side in SIDES if row.spring.endswith(side))
+        colour, marker = side_look(row.name)
         if key in row.changes:
             x = 100.0 * row.changes[key]
-            ax.plot([0.0, x], [y, y], color=LINE_COLOUR[side], linewidth=1.4, solid_capstyle="butt")
-            ax.plot(x, y, MARKER[side], color=LINE_COLOUR[side], markersize=4.5)
+            ax.plot([0.0, x], [y, y], color=colour, linewidth=1.4, solid_capstyle="butt")
+            ax.plot(x, y, marker, color=colour, markersize=4.5)
             shown.append(x)
-        paper = paper_changes(result, row)
-        if key in paper:
-            x = 100.0 * paper[key]
+        if key in row.changes_article:
+            x = 100.0 * row.changes_article[key]
             ax.plot(x, y, "D", markersize=4.5, mfc="none", mec="black", mew=0.8)
             shown.append(x)
     room = max(max(shown) - min(shown), _LEAST_SPAN)
@@ -89,10 +87,10 @@ def _handles(result: Perturbation) -> list[Artist]:
     """Return the entries of the legend."""
     handles: list[Artist] = [
         Line2D([], [], color=LINE_COLOUR[side], marker=MARKER[side], markersize=4.5,
-               label=f"{side} spring moved")
+               label=f"{side} {result.noun} moved")
         for side in reversed(SIDES)
     ]  # fmt: skip
-    if any(paper_changes(result, row) for row in result.rows):
+    if any(row.changes_article for row in result.rows):
         handles.append(
             Line2D([], [], color="black", marker="D", markersize=4.5, mfc="none", linewidth=0,
                    label="article, table 5\n(another optimum)")

@@ -1,1 +1,254 @@
-"""What every number of patient and orthosis does to an optimum."""
+"""What every number of patient and orthosis does to the optimum, from its KKT system.
+
+No problem is solved again, except where a check by finite differences is asked for.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pathwalker_cli.case import Case
+from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.errors import ConfigError, NotConvergedError
+from pathwalker_cli.gait.bounds import held
+from pathwalker_cli.gait.neighbourhood import Derivative, Neighbourhood
+from pathwalker_cli.gait.resolve import Optimum
+from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.gait.symmetry import require_symmetry
+from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.model.numbers import Unknown
+from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient.blocks import SegmentLengths, Strengths
+from pathwalker_cli.patient.variation import Variation, varied
+from pathwalker_cli.results.run_folder import Run
+from pathwalker_cli.studies.base import (
+    NeighbourStudy,
+    Plan,
+    StudyKind,
+    Work,
+    require_optimum,
+    resolver_of,
+)
+from pathwalker_cli.studies.measures import all_measures, measures
+from pathwalker_cli.studies.neighbours import Journal
+from pathwalker_cli.studies.sensitivity.result import (
+    FILES,
+    Check,
+    Sensitivities,
+    Sensitivity,
+    sensitivity_content,
+    sensitivity_lines,
+    write_sensitivities,
+)
+
+__all__ = ["STUDY", "SensitivityStudy", "asked_places", "default_places", "sensitivities"]
+
+POINTS: Final = "points"
+"""Folder of the re-solves of a check."""
+
+_ORTHOSIS: Final = ("neutral_angle", "free_play", "preload_torque")
+
+_ORTHOSIS_PAIRS: Final = {
+    "dorsiflexion_stop": SIDES,
+    "plantarflexion_stop": SIDES,
+    "stop_stiffness": ("dorsiflexion", "plantarflexion"),
+}
+
+Step = Annotated[float, Quantity("", 1e-5, 0.2, above="is it in percent?")]
+
+
+class SensitivityStudy(NeighbourStudy):
+    """Which numbers are asked about, and which answers are checked by solving again."""
+
+    places: tuple[str, ...] = ()
+    tolerance: Annotated[float, Quantity("", 1e-12, 1e-6)] = 1e-9
+    check: tuple[str, ...] = ()
+    check_step: Step = 5e-4
+
+    def solved_as(self, case: Case) -> Case:
+        """Return a case with the tolerance of the study."""
+        return case.with_values({"solver.tolerance": self.tolerance})
+
+
+def default_places(patient: Patient, with_orthosis: bool) -> tuple[str, ...]:
+    """Return the places in a patient's file that are asked about.
+
+    Args:
+        patient: The patient.
+        with_orthosis: Whether the orthosis is worn.
+    """
+    places = []
+    if with_orthosis:
+        places += [f"orthosis.{name}" for name in _ORTHOSIS]
+        places += [f"orthosis.{name}.{end}" for name, two in _ORTHOSIS_PAIRS.items() for end in two]
+    places += ["strengths"]
+    for name in Strengths.model_fields:
+        sides = ("",) if name.startswith("lumbar") else (".right", ".left")
+        places += [f"strengths.{name}{side}" for side in sides]
+    return (*places, "body_mass", *(f"segment_lengths.{n}" for n in SegmentLengths.model_fields))
+
+
+def asked_places(asked: SensitivityStudy, solver: GaitSolver) -> tuple[str, ...]:
+    """Return the numbers that a study asks about: those that are free, and places in the file.
+
+    A place whose number the problem chooses itself changes nothing, and is left out.
+
+    Raises:
+        ConfigError: If a check is asked for what is not asked about.
+    """
+    free, walker = solver.free, solver.walker
+    chosen = {place for u in free for place in (u.address, *u.addresses)}
+    usual = default_places(walker.patient, solver.config.condition == "orthosis")
+    given = asked.places or tuple(place for place in usual if place not in chosen)
+    places = (*(u.name for u in free), *given)
+    unknown = [place for place in asked.check if place not in places]
+    if unknown:
+        raise ConfigError(f"names {unknown[0]}", where="check", allowed=", ".join(places))
+    return places
+
+
+def plan(asked: SensitivityStudy, solver: GaitSolver) -> Plan:
+    """Return what would be asked about.
+
+    Raises:
+        ConfigError: If a place does not exist, or cannot change alone in half a cycle.
+    """
+    places = asked_places(asked, solver)
+    for place in places[len(solver.free) :]:
+        factor = 1.0 + asked.check_step if solver.config.half_cycle else 1.0
+        try:
+            patient = varied(solver.walker.patient, Variation(scale={place: factor}))
+        except ConfigError as error:
+            raise ConfigError(
+                error.what, where="places", allowed=error.allowed, mend=error.mend
+            ) from None
+        if solver.config.half_cycle:
+            require_symmetry(Case(solver.config, patient).walker(solver.config.model.backend))
+    count = len(asked.check)
+    does = f"{len(places)} numbers asked about; two solves for each of {count} checks"
+    return Plan(does, 2 * count)
+
+
+def sensitivities(asked: SensitivityStudy, run: Run, work: Work) -> Sensitivities:
+    """Return the sensitivities of an optimum.
+
+    Args:
+        asked: What is asked.
+        run: The converged run.
+        work: Where; re-solves of checks are kept there.
+
+    Raises:
+        ConfigError: If a place does not exist, or a check is asked for what is not.
+        NotConvergedError: If the optimum cannot be solved to the tolerance.
+    """
+    case = asked.solved_as(run.case)
+    resolver = resolver_of(run, asked.tolerance)
+    require_optimum(resolver, run, asked.tolerance)
+    around = Neighbourhood(resolver)
+    began = time.perf_counter()
+    places = asked_places(asked, around.optimum.solver)
+    base = all_measures(around.optimum)
+    rows = tuple(_sensitivity(around, place, base) for place in places)
+    seconds = time.perf_counter() - began
+    journal = Journal(work.folder / POINTS, run, resolver)
+    return Sensitivities(
+        problem=case.config.problem,
+        patient=case.unvaried.id,
+        tolerance=asked.tolerance,
+        base=base,
+        rows=rows,
+        checks=tuple(
+            _check(around, journal, case, place, asked.check_step) for place in asked.check
+        ),
+        active=around.kkt.active,
+        doubtful=around.kkt.doubtful,
+        seconds=seconds,
+    )
+
+
+def _sensitivity(around: Neighbourhood, place: str, base: Mapping[str, float]) -> Sensitivity:
+    """Return the answer to one number."""
+    value, unknown = _value(around.optimum, place), _unknown(around.optimum, place)
+    if unknown is not None:
+        derivative, unit = around.by_unknown(unknown), around.optimum.value(unknown)
+    else:
+        derivative, unit = around.by_factor(place), 1.0
+    derivatives = {key: unit * slope for key, slope in _slopes(derivative).items()}
+    elasticities = {key: slope / base[key] if base[key] else None
+                    for key, slope in derivatives.items()}  # fmt: skip
+    return Sensitivity(place, value, derivatives, elasticities)
+
+
+def _slopes(at: Derivative) -> dict[str, float]:
+    """Return the derivatives of all measures."""
+    below, above = all_measures(at.below), all_measures(at.above)
+    slopes = {key: (above[key] - below[key]) / (2.0 * at.step) for key in above if key in below}
+    return {**slopes, "cost": at.cost}
+
+
+def _unknown(optimum: Optimum, place: str) -> Unknown | None:
+    """Return the unknown of that name, None where it is a place in the patient's file."""
+    return next((unknown for unknown in optimum.free if unknown.name == place), None)
+
+
+def _value(optimum: Optimum, place: str) -> float | None:
+    """Return the number at a place, None where there are several."""
+    if (unknown := _unknown(optimum, place)) is not None:
+        return optimum.value(unknown)
+    value: Any = optimum.solver.walker.patient
+    for part in place.split("."):
+        value = getattr(value, part, None)
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _check(around: Neighbourhood, journal: Journal, case: Case, place: str, step: float) -> Check:
+    """Return the central difference of two solves."""
+    ends = []
+    for sign in (-1.0, 1.0):
+        values = _moved(around.optimum, place, 1.0 + sign * step)
+        end = journal.resolve(f"{place}{sign * step:+g}", case.with_values(values))
+        if not end.converged:
+            raise NotConvergedError(f"the check of {place} did not converge: {end.result.status}")
+        ends.append(end)
+    below, above = (measures(end) for end in ends)
+    return Check(
+        place,
+        step,
+        {key: (above[key] - below[key]) / (2.0 * step) for key in above},
+        sum(end.result.iterations for end in ends),
+        sum(end.result.seconds for end in ends),
+        max(around.changed_activity(end) for end in ends),
+    )
+
+
+def _moved(optimum: Optimum, place: str, factor: float) -> dict[str, Any]:
+    """Return config values with one number scaled."""
+    config = optimum.config
+    if (unknown := _unknown(optimum, place)) is not None:
+        return held(config, {unknown: factor * optimum.value(unknown)})
+    scale = dict(config.variation.scale)
+    return {"variation.scale": {**scale, place: factor * scale.get(place, 1.0)}}
+
+
+def _write(result: Sensitivities, folder: Path) -> None:
+    from pathwalker_cli.studies.sensitivity.figures import save_sensitivity_figure
+
+    write_sensitivities(result, folder)
+    save_sensitivity_figure(result, folder / "figures")
+
+
+STUDY: Final = StudyKind(
+    model=SensitivityStudy,
+    files=frozenset({POINTS, "figures", *FILES}),
+    varies="",
+    plan=plan,
+    run=sensitivities,
+    write=_write,
+    content=sensitivity_content,
+    lines=sensitivity_lines,
+    whole_cycle=False,
+)
+"""The study of what one percent of every number changes."""

@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import NEUTRAL, STYLE, dress, new_figure
 from pathwalker_cli.stride.measures import measure_of
-from pathwalker_cli.studies.sensitivity.result import Sensitivities
-from pathwalker_cli.studies.sensitivity.text import label_of
+from pathwalker_cli.studies.sensitivity.result import Sensitivities, label_of
 
 __all__ = ["save_sensitivity_figure", "sensitivity_figure"]
 

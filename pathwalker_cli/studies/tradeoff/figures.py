@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.conventions import STIFFNESSES, Side
+from pathwalker_cli.conventions import Side
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -24,6 +24,7 @@ from pathwalker_cli.stride.figures.style import (
     legend,
     new_figure,
 )
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
 __all__ = ["save_tradeoff_figure", "tradeoff_figure"]
@@ -35,46 +36,33 @@ _NEAR: Final = 0.01
 
 
 def tradeoff_figure(tradeoff: Tradeoff) -> Figure:
-    """Return the figure of a trade-off.
-
-    Args:
-        tradeoff: The trade-off, with at least one solution.
-    """
-    springs = tradeoff.condition == "orthosis"
+    """Return the figure of a trade-off with at least one solution."""
     with mpl.rc_context(STYLE):
-        rows = 2 if springs else 1
+        rows = 2 if tradeoff.springs else 1
         fig = new_figure(0.5 + 2.0 * rows)
         panels = fig.subplots(rows, 1, squeeze=False)[:, 0]
         _draw_front(panels[0], tradeoff)
         dress(panels[0], "What speed costs", _SPEED, "effort per distance [s/m]")
-        if springs:
-            _draw_springs(panels[1], tradeoff.front)
+        if tradeoff.springs:
+            _draw_springs(panels[1], tradeoff)
             dress(panels[1], "Springs along the front", _SPEED, "stiffness [N m/rad]")
         legend(fig, _handles(tradeoff))
     return fig
 
 
-def save_tradeoff_figure(folder: Path, tradeoff: Tradeoff) -> None:
-    """Save the figure of a trade-off as PNG and SVG.
-
-    Args:
-        folder: Where.
-        tradeoff: The trade-off.
-    """
+def save_tradeoff_figure(tradeoff: Tradeoff, folder: Path) -> None:
+    """Save the figure of a trade-off as PNG and SVG."""
     save_formats(tradeoff_figure(tradeoff), folder, "tradeoff")
 
 
 def _draw_front(ax: Axes, tradeoff: Tradeoff) -> None:
     """Draw the front with its weights, points off it, and the recorded speeds."""
-    if tradeoff.recorded is not None:
-        ax.axvspan(*tradeoff.recorded, color="#bbbbbb", alpha=0.5, linewidth=0.0)
-    front = tradeoff.front
-    ax.plot([p.speed for p in front], [p.effort for p in front], color="black", marker="o",
-            markersize=4.0)  # fmt: skip
-    beaten = [p for p in tradeoff.solved if p not in front]
-    ax.plot([p.speed for p in beaten], [p.effort for p in beaten], **_BEATEN)
-    coarse = [p for p in tradeoff.solved if p.mesh_status == "inaccurate"]
-    ax.plot([p.speed for p in coarse], [p.effort for p in coarse], **_COARSE)
+    if tradeoff.recorded_walking_speed is not None:
+        ax.axvspan(*tradeoff.recorded_walking_speed, color="#bbbbbb", alpha=0.5, linewidth=0.0)
+    beaten = [point for point in tradeoff.solved if point.dominated]
+    for points, look in ((tradeoff.front_points, _FRONT), (beaten, _BEATEN),
+                         (tradeoff.coarse, _COARSE)):  # fmt: skip
+        ax.plot([p.speed for p in points], [p.effort for p in points], **look)
     # in turn below and above, since points may be near one another
     for i, (point, text) in enumerate(labels(tradeoff.solved)):
         place: dict[str, Any] = {"ha": ("left", "right")[i % 2], "va": ("top", "bottom")[i % 2]}
@@ -98,16 +86,17 @@ def labels(points: Sequence[FrontPoint]) -> list[tuple[FrontPoint, str]]:
         )
         groups[-1].append(point) if near else groups.append([point])
     return [
-        (group[0], f"{group[0].weight:g}" + (f" to {group[-1].weight:g}" if group[1:] else ""))
+        (group[0], " to ".join(f"{p.walking_speed_weight:g}" for p in (group[0], *group[1:][-1:])))
         for group in groups
     ]
 
 
-def _draw_springs(ax: Axes, front: Sequence[FrontPoint]) -> None:
+def _draw_springs(ax: Axes, tradeoff: Tradeoff) -> None:
     """Draw the four stiffnesses over speed."""
-    speed = [point.speed for point in front]
-    for name in STIFFNESSES:
-        ax.plot(speed, [point.measures[name] for point in front], **_spring(name))
+    front = tradeoff.front_points
+    for name in tradeoff.springs:
+        stiffness = [point.measures[name] for point in front]
+        ax.plot([point.speed for point in front], stiffness, **_spring(name))
     ax.set_ylim(bottom=0.0)
 
 
@@ -124,6 +113,7 @@ def _spring(name: str) -> dict[str, Any]:
     }
 
 
+_FRONT: Final[dict[str, Any]] = {"color": "black", "marker": "o", "markersize": 4.0}
 _BEATEN: Final[dict[str, Any]] = {
     "linestyle": "none", "marker": "o", "markersize": 4.0, "color": NEUTRAL, "fillstyle": "none",
 }  # fmt: skip
@@ -134,16 +124,14 @@ _COARSE: Final[dict[str, Any]] = {
 
 def _handles(tradeoff: Tradeoff) -> list[Artist]:
     """Return the legend entries of what is in the figure."""
-    found: list[Artist] = [Line2D([], [], color="black", marker="o", markersize=4.0,
-                                  label="front, with weight of speed")]  # fmt: skip
+    handles: list[Artist] = [Line2D([], [], label="front, with weight of speed", **_FRONT)]
     if len(tradeoff.front) < len(tradeoff.solved):
-        found.append(Line2D([], [], label="dominated", **_BEATEN))
-    if any(point.mesh_status == "inaccurate" for point in tradeoff.solved):
-        found.append(Line2D([], [], label="mesh too coarse", **_COARSE))
-    if tradeoff.recorded is not None:
-        found.append(Patch(facecolor="#bbbbbb", alpha=0.5, label="recorded speeds"))
-    if tradeoff.condition == "orthosis":
-        for name in STIFFNESSES:
-            label = f"K_{name[0].upper()} {name.split('_')[2]}"
-            found.append(Line2D([], [], **_spring(name), label=label))
-    return found
+        handles.append(Line2D([], [], label="dominated", **_BEATEN))
+    if tradeoff.coarse:
+        handles.append(Line2D([], [], label="mesh too coarse", **_COARSE))
+    if tradeoff.recorded_walking_speed is not None:
+        handles.append(Patch(facecolor="#bbbbbb", alpha=0.5, label="recorded speeds"))
+    return [
+        *handles,
+        *(Line2D([], [], **_spring(n), label=measure_of(n).label) for n in tradeoff.springs),
+    ]

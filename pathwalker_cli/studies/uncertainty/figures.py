@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -25,8 +25,9 @@ from pathwalker_cli.stride.figures.style import (
     dress,
     legend,
     new_figure,
+    side_look,
 )
-from pathwalker_cli.studies.springs import Ranges
+from pathwalker_cli.studies.measures import Ranges
 from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
 
 __all__ = ["correlation_figure", "save_uncertainty_figures", "spread_figure"]
@@ -47,24 +48,24 @@ def save_uncertainty_figures(result: Uncertainty, folder: Path) -> None:
     """Save all figures as PNG and SVG; none without draws that converged."""
     if not result.converged:
         return
-    found = spreads(result)
+    all_spreads = spreads(result)
     values = {measure.key: result.values(measure.key) for measure in result.measures}
-    save_formats(spread_figure(values, result.ranges, found), folder, "uncertainty")
-    save_formats(correlation_figure(result, found), folder, "correlations")
+    save_formats(spread_figure(values, result.ranges, all_spreads), folder, "uncertainty")
+    save_formats(correlation_figure(result, all_spreads), folder, "correlations")
 
 
 def spread_figure(
-    values: Mapping[str, np.ndarray], ranges: Ranges, found: Sequence[Spread]
+    values: Mapping[str, np.ndarray], ranges: Ranges, spreads_of: Sequence[Spread]
 ) -> Figure:
     """Return the springs of all draws in their ranges, and cost and gait around the base.
 
     Args:
         values: Every measure of all converged draws, SI units, each of shape (n,).
-        ranges: Allowed range by spring [N m/rad].
-        found: How the measures spread.
+        ranges: Allowed range by spring, and further number [SI].
+        spreads_of: How the measures spread.
     """
-    springs = [spread for spread in found if spread.measure.key in ranges]
-    others = [spread for spread in found if spread.measure.key not in ranges]
+    springs = [spread for spread in spreads_of if spread.measure.key in STIFFNESSES]
+    others = [spread for spread in spreads_of if spread not in springs and spread.base]
     with mpl.rc_context(STYLE):
         rows = (len(springs) + 1, len(others))
         fig = new_figure(1.6 + 0.27 * sum(rows))
@@ -85,7 +86,7 @@ def spread_figure(
         dress(right, "Cost and gait", "deviation from the base [%]")
         for ax in (left, right):
             ax.grid(visible=False, axis="y")
-        legend(fig, _handles(len(values[found[0].measure.key])))
+        legend(fig, _handles(len(values[spreads_of[0].measure.key])))
         return fig
 
 
@@ -99,8 +100,7 @@ def _draw(ax: Axes, y: int, values: np.ndarray, spread: Spread, unit: float) -> 
         spread: The measure.
         unit: 100 for deviations in %, where the base is zero; 1 for the values themselves.
     """
-    side = next((side for side in SIDES if side in spread.measure.key), None)
-    colour, marker = (LINE_COLOUR[side], MARKER[side]) if side else (NEUTRAL, "^")
+    colour, marker = side_look(spread.measure.key)
     heights = y + np.random.default_rng(_SEED).uniform(-_STRIP, _STRIP, len(values))
     ax.plot(values, heights, marker, color=colour, markersize=2.6, alpha=0.45, mew=0.0)
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
@@ -147,10 +147,10 @@ def _handles(count: int) -> list[Artist]:
     ]
 
 
-def correlation_figure(result: Uncertainty, found: list[Spread]) -> Figure:
+def correlation_figure(result: Uncertainty, all_spreads: list[Spread]) -> Figure:
     """Return the rank correlation of every input with every measure as a coloured table."""
     inputs = [entry.place for entry in result.draws.inputs]
-    table = np.array([spread.correlations for spread in found]).T
+    table = np.array([spread.correlations for spread in all_spreads]).T
     level = chance_level(len(result.converged), len(inputs))
     with mpl.rc_context(STYLE):
         fig = new_figure(1.5 + 0.13 * len(inputs))
@@ -164,7 +164,7 @@ def correlation_figure(result: Uncertainty, found: list[Spread]) -> Figure:
             elif not np.isfinite(value):
                 ax.text(x, y, "-", color=NEUTRAL, **_CELL)
         ax.set_yticks(range(len(inputs)), [_input(place) for place in inputs])
-        ax.set_xticks(range(len(found)), [s.measure.short for s in found], rotation=90)
+        ax.set_xticks(range(len(all_spreads)), [s.measure.short for s in all_spreads], rotation=90)
         ax.tick_params(length=0.0)
         words = (
             f"rank correlation [1]; numbers where chance\n(up to {level:.2f}) does not explain it"

@@ -1,4 +1,4 @@
-"""What an uncertainty study found: draws, and how measures spread over them.
+"""How measures spread over draws of a patient: numbers, files, and a table for the terminal.
 
 References:
     Spearman (1904), The American Journal of Psychology 15, 72-101: rank correlation.
@@ -6,25 +6,47 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 from scipy import stats
 
 from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.io.csv_file import write_table
+from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.results.text import spring_ends
 from pathwalker_cli.stride.measure import Measure
-from pathwalker_cli.stride.measures import measures_in
-from pathwalker_cli.studies.pool import Solved
-from pathwalker_cli.studies.springs import Ranges
+from pathwalker_cli.studies.measures import Ranges, range_content
+from pathwalker_cli.studies.neighbours import Solved
 from pathwalker_cli.studies.uncertainty.draws import Draws, Input
 
-__all__ = ["Spread", "Uncertainty", "chance_level", "rank_correlations", "spreads"]
+__all__ = [
+    "FILES",
+    "Spread",
+    "Uncertainty",
+    "chance_level",
+    "rank_correlations",
+    "shown_text",
+    "spreads",
+    "uncertainty_content",
+    "uncertainty_lines",
+    "write_tables",
+]
+
+FILES: Final = ("draws.csv", "uncertainty.csv", "correlations.csv", "uncertainty.json")
+
+_DIGITS: Final = {"N m/rad": 1, "deg": 1, "m": 3, "m/s": 3, "s": 3, "s/m": 3, "": 4}
+"""Digits after the point by unit shown; of others three."""
+
+_LISTED: Final = 5
+"""Failed draws that the terminal lists one by one, and inputs of each."""
 
 QUANTILES: Final = (0.05, 0.5, 0.95)
-"""What is told of the distribution of a measure: the middle, and the range of 90 % of draws."""
+"""What stands for the distribution of a measure: the middle, and the range of 90 % of draws."""
 
 _CHANCE: Final = 0.05
 """Probability that among inputs without any effect the strongest one is named all the same."""
@@ -39,7 +61,9 @@ class Uncertainty:
         patient: Id of the patient.
         intervals: Mesh intervals of all solves.
         base: Measures at the numbers of the file, SI units.
-        ranges: Allowed range by spring [N m/rad].
+        ranges: Allowed range by spring and further number [SI].
+        measures: What is measured, in order.
+        further: SI units of the unknowns beside the springs, by name.
         draws: What was drawn.
         solved: How each draw ended, in order.
         seconds: Wall seconds in all, the solve of the base from nothing apart.
@@ -51,6 +75,8 @@ class Uncertainty:
     intervals: int
     base: Mapping[str, float]
     ranges: Ranges
+    measures: tuple[Measure, ...]
+    further: Mapping[str, str]
     draws: Draws
     solved: tuple[Solved, ...]
     seconds: float
@@ -66,19 +92,14 @@ class Uncertainty:
         """Draws that did."""
         return tuple(end for end in self.solved if end.values)
 
-    @property
-    def measures(self) -> tuple[Measure, ...]:
-        """What is measured, in order."""
-        return tuple(m for m in measures_in("studies") if m.key in self.base)
-
     def values(self, key: str) -> np.ndarray:
         """Return a measure of all converged draws; at a limit, the limit itself, shape (n,)."""
-        found = []
+        values = []
         for end in self.converged:
             at = spring_ends(end.values, self.ranges).get(key)
             limit = None if at is None else self.ranges[key][at == "upper"]
-            found.append(end.values[key] if limit is None else limit)
-        return np.array(found)
+            values.append(end.values[key] if limit is None else limit)
+        return np.array(values)
 
 
 @dataclass(frozen=True)
@@ -103,6 +124,18 @@ class Spread:
     correlations: np.ndarray
     strongest: Input | None
 
+    @property
+    def place(self) -> str:
+        """Place of the strongest input, "" without one."""
+        return "" if self.strongest is None else self.strongest.place
+
+    @property
+    def strength(self) -> float | None:
+        """The largest correlation; None if chance alone could make it."""
+        if self.strongest is None:
+            return None
+        return float(self.correlations[np.nanargmax(np.abs(self.correlations))])
+
 
 def spreads(result: Uncertainty) -> list[Spread]:
     """Return how every measure spreads."""
@@ -113,8 +146,7 @@ def _spread(result: Uncertainty, measure: Measure) -> Spread:
     values = result.values(measure.key)
     free = measure.key in result.ranges and len(values) > 0
     low, high = result.ranges.get(measure.key, (np.nan, np.nan))
-    kept = [end.name for end in result.converged]
-    rows = [i for i, end in enumerate(result.solved) if end.name in set(kept)]
+    rows = [i for i, end in enumerate(result.solved) if end.values]
     correlations = rank_correlations(result.draws.values[rows], values)
     return Spread(
         measure=measure,
@@ -156,3 +188,170 @@ def _strongest(inputs: Sequence[Input], correlations: Iterable[float], draws: in
     sizes = [abs(c) if np.isfinite(c) else 0.0 for c in correlations]
     best = int(np.argmax(sizes))
     return inputs[best] if sizes[best] > chance_level(draws, len(inputs)) else None
+
+
+def write_tables(result: Uncertainty, folder: Path) -> None:
+    """Write `draws.csv`, `uncertainty.csv`, `correlations.csv` and `uncertainty.json`."""
+    _write_draws(result, folder / FILES[0])
+    all_spreads = spreads(result)
+    header = ["measure", "unit", "base", "quantile 0.05", "median", "quantile 0.95", "draws [1]",
+              "share at lower limit [1]", "share at upper limit [1]", "strongest input",
+              "rank correlation [1]"]  # fmt: skip
+    rows = []
+    for spread in all_spreads:
+        numbers = [_number(value) for value in (spread.base, *spread.quantiles)]
+        rows.append([spread.measure.key, spread.measure.unit, *numbers, len(result.converged),
+                     spread.lower, spread.upper, spread.place, spread.strength])  # fmt: skip
+    write_table(folder / FILES[1], header, rows)
+    columns: list[list[Any]] = [["input", *(entry.place for entry in result.draws.inputs)]]
+    columns += [[f"{s.measure.key} [1]", *map(_number, s.correlations)] for s in all_spreads]
+    names, *lines = zip(*columns, strict=True)
+    write_table(folder / FILES[2], names, lines)
+    write_json(folder / FILES[3], uncertainty_content(result))
+
+
+def uncertainty_content(result: Uncertainty) -> dict[str, Any]:
+    """Return how everything spreads as plain values; SI units."""
+    return {
+        "problem": result.config.problem,
+        "patient": result.patient,
+        "tolerance": result.config.solver.tolerance,
+        "intervals": result.intervals,
+        "seconds": result.seconds,
+        "draws": len(result.solved),
+        "failed": [end.name for end in result.failed],
+        "base": result.base,
+        **range_content(result.ranges),
+        **({"further": result.further} if result.further else {}),
+        "spreads": {spread.measure.key: _spread_content(spread) for spread in spreads(result)},
+    }
+
+
+def _spread_content(spread: Spread) -> dict[str, Any]:
+    return {
+        "quantiles": dict(zip(map(str, QUANTILES), map(_number, spread.quantiles), strict=True)),
+        "share_at_lower_limit": spread.lower,
+        "share_at_upper_limit": spread.upper,
+        "strongest_input": spread.place or None,
+        "rank_correlation": spread.strength,
+    }
+
+
+def _write_draws(result: Uncertainty, path: Path) -> None:
+    """Write one row per draw: what was drawn, where it ended, and how to solve it again."""
+    header = ["draw", *(entry.heading for entry in result.draws.inputs), "status"]
+    header += [measure.column for measure in result.measures]
+    header += ["iterations", "seconds [s]", "variation"]
+    rows = []
+    for number, end in enumerate(result.solved):
+        variation = result.config.variation.merged(result.draws.variation(number))
+        text = json.dumps(variation.model_dump(mode="json"))
+        values = [end.values.get(m.key) for m in result.measures]
+        drawn = result.draws.values[number].tolist()
+        rows.append([number, *drawn, end.status, *values, end.iterations, end.seconds, text])
+    write_table(path, header, rows)
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def uncertainty_lines(result: Uncertainty) -> Iterator[str]:
+    """Yield the table of the terminal: medians, ranges, limits and the inputs that matter most."""
+    inputs, count, converged = len(result.draws.inputs), len(result.solved), len(result.converged)
+    yield (
+        f"{result.config.problem}, patient {result.patient}, {result.intervals} intervals: "
+        f"{count} draws of {inputs} inputs, {converged} converged"
+    )
+    if converged:
+        yield ""
+        yield _line("", "base", "median", "90 % of draws", "follows most", "rank corr.")
+        all_spreads = spreads(result)
+        yield from map(_row, all_spreads)
+        yield ""
+        yield from _limits(result, all_spreads)
+        level = chance_level(converged, inputs)
+        yield f"a correlation up to {level:.2f} may be chance among {inputs} inputs: none is named"
+    yield ""
+    yield from _failures(result)
+    yield _seconds(result)
+
+
+def _row(spread: Spread) -> str:
+    measure = spread.measure
+    unit = f" [{measure.shown_unit}]" if measure.shown_unit else ""
+    low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
+    strength = "" if spread.strength is None else f"{spread.strength:+.2f}"
+    base, label = shown_text(measure, spread.base), f"{measure.label}{unit}"
+    return _line(label, base, middle, f"{low} to {high}", spread.place or "-", strength)
+
+
+def shown_text(measure: Measure, value: float) -> str:
+    """Return a value of a measure in the unit for people."""
+    return f"{measure.in_shown_unit(value):.{_DIGITS.get(measure.shown_unit, 3)}f}"
+
+
+def _line(label: str, base: str, middle: str, span: str, place: str, strength: str) -> str:
+    return f"{label:<37}{base:>8}{middle:>9}{span:>18}  {place:<34}{strength:>10}".rstrip()
+
+
+def _limits(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
+    """Yield how often each spring and further number sits at a limit."""
+    for spread in all_spreads:
+        key, unit = spread.measure.key, spread.measure.unit
+        if spread.lower is None or spread.upper is None:
+            if key in result.ranges:
+                yield f"{spread.measure.label}: prescribed at {spread.base:.4g} {unit}"
+            continue
+        low, high = result.ranges[key]
+        yield (
+            f"{spread.measure.label}: at its lower limit of {low:g} {unit} in "
+            f"{100.0 * spread.lower:.0f} % of the draws, at its upper one of {high:g} in "
+            f"{100.0 * spread.upper:.0f} %"
+        )
+    if not any(low < high for low, high in result.ranges.values()):
+        yield "no spring is free"
+
+
+def _failures(result: Uncertainty) -> Iterator[str]:
+    """Yield what happened to draws that did not converge."""
+    if not result.failed:
+        return
+    share = 100.0 * len(result.failed) / len(result.solved)
+    yield (
+        f"{len(result.failed)} draws ({share:.0f} %) did not converge and are left out above; what "
+        f"was drawn for them stands in {FILES[0]}:"
+    )
+    numbers = {end.name: number for number, end in enumerate(result.solved)}
+    for end in result.failed[:_LISTED]:
+        yield f"  draw {numbers[end.name]}: {end.status}; {_extremes(result, numbers[end.name])}"
+    if len(result.failed) > _LISTED:
+        yield f"  and {len(result.failed) - _LISTED} more"
+
+
+def _extremes(result: Uncertainty, number: int) -> str:
+    """Return the inputs of a draw that are furthest from the middle of all draws."""
+    values = result.draws.values
+    spread = np.maximum(values.std(axis=0), np.finfo(float).tiny)
+    far = np.argsort(-np.abs(values[number] - np.median(values, axis=0)) / spread)[:_LISTED]
+    parts = []
+    for i in sorted(far):
+        entry, value = result.draws.inputs[i], values[number, i]
+        parts.append(f"{entry.place} {f'x {value:.3g}' if entry.relative else f'{value:+.3g}'}")
+    return ", ".join(parts)
+
+
+def _seconds(result: Uncertainty) -> str:
+    """Return how long it took."""
+    fresh = [end for end in result.solved if not end.kept]
+    kept = len(result.solved) - len(fresh)
+    there = f", {kept} were there already" if kept else ""
+    processes = "one process" if result.workers == 1 else f"{result.workers} processes"
+    text = f"{result.seconds:.0f} s in all, {processes}{there}"
+    if not fresh:
+        return text
+    seconds, iterations = [end.seconds for end in fresh], [end.iterations for end in fresh]
+    return (
+        f"{text}; per draw {np.median(seconds):.1f} s and {np.median(iterations):.0f} iterations "
+        f"at the median, {max(seconds):.1f} s and {max(iterations)} at most"
+    )

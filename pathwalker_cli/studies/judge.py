@@ -1,0 +1,339 @@
+"""The judge of an identification: solves its neighbourhood, and how far each number may move."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.gait.bounds import held
+from pathwalker_cli.gait.neighbourhood import Neighbourhood
+from pathwalker_cli.gait.resolve import Optimum, Resolver
+from pathwalker_cli.gait.solution import GaitSolution
+from pathwalker_cli.model.numbers import Unknown
+from pathwalker_cli.patient.blocks import RealSpring
+from pathwalker_cli.results.text import end_of
+from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.studies.verdict import (
+    SHARE,
+    NumberVerdict,
+    SnappedSprings,
+    StopVerdict,
+    Verdict,
+)
+
+__all__ = ["Edge", "find_edge", "verdict_of"]
+
+_CANDIDATES: Final = 2
+"""Real springs next to an identified stiffness that are considered."""
+
+
+def verdict_of(solution: GaitSolution) -> Verdict | None:
+    """Return the verdict on an identification, solving its neighbourhood.
+
+    Args:
+        solution: A converged solution by collocation.
+
+    Returns:
+        None where there is no number to judge: nothing free to choose, half a cycle (where both
+        sides are one), or a solution that is not one.
+    """
+    config = solution.config
+    if not solution.converged or not solution.walker.unknowns:
+        return None
+    if config.half_cycle or config.transcription != "collocation":
+        return None
+    began = time.perf_counter()
+    resolver = Resolver(solution.case, solution.last_motion, solution.nlp.multipliers)
+    judge = _Judge(resolver)
+    if not judge.around.free or not judge.optimum.converged:
+        return None
+    verdicts = {unknown: judge.number(unknown) for unknown in judge.optimum.solver.walker.unknowns}
+    springs = tuple(_springs(verdicts))
+    names = {spring.name for spring in springs}
+    snapped = judge.snapped()
+    near = [o for o in solution.optima if o.converged]
+    best = min((o.cost for o in near), default=0.0)
+    return Verdict(
+        springs=springs,
+        numbers=tuple(v for u, v in verdicts.items() if not names.intersection(_full_names(u))),
+        stops=tuple(_stops(judge.optimum.series)),
+        snapped=snapped,
+        optima=tuple(o for o in near if o.cost <= best + SHARE * abs(best)),
+        starts=len(near),
+        solves=judge.solves,
+        seconds=time.perf_counter() - began,
+    )
+
+
+class _Judge:
+    """Solves around an optimum."""
+
+    def __init__(self, resolver: Resolver) -> None:
+        self.resolver = resolver
+        self.around = Neighbourhood(resolver)
+        self.optimum = self.around.optimum
+        self.solves = 0
+
+    @property
+    def config(self) -> StudyConfig:
+        """The config of the optimum."""
+        return self.optimum.config
+
+    def number(self, unknown: Unknown) -> NumberVerdict:
+        """Return the verdict on one number."""
+        value, limits = self.optimum.value(unknown), self.optimum.range(unknown)
+        about = (unknown.name, unknown.label, unknown.unit, value)
+        tied = len(unknown.numbers) > 1
+        if unknown not in self.around.free:
+            only = (value, value)
+            return NumberVerdict(
+                *about, only, "", 0.0, 0.0, only, (True, True), certain=True, tied=tied
+            )
+        which = self.around.free.index(unknown)
+        size = abs(self.optimum.cost)
+        gradient = float(self.around.cost_gradient[which]) / size
+        curvature = self.around.curvature(unknown) / size
+        limit = end_of(value, limits)
+        edges = []
+        for end, sign in zip(limits, (-1.0, 1.0), strict=True):
+            if limit == {-1.0: "lower", 1.0: "upper"}[sign]:
+                edges.append(Edge(end, True, 0.0, True, 0, 0))
+                continue
+            step = _quadratic_edge(sign * gradient if limit else 0.0, curvature)
+            edges.append(self._edge(unknown, value, end, step, not limit))
+        return NumberVerdict(
+            *about,
+            limits,
+            limit,
+            gradient if limit else 0.0,
+            curvature,
+            (edges[0].value, edges[1].value),
+            (edges[0].limit, edges[1].limit),
+            all(edge.certain for edge in edges),
+            (edges[0].again, edges[1].again),
+            tied,
+        )
+
+    def _edge(self, unknown: Unknown, start: float, end: float, step: float, look: bool) -> Edge:
+        """Return an edge; a cost that slopes from a limit is not searched for another basin."""
+
+        def solve(value: float, near: Optimum, insist: bool) -> Optimum:
+            return self._solved({unknown: value}, near, insist)
+
+        edge = find_edge(solve, self.optimum, start, end, SHARE, step, look)
+        self.solves += edge.solves
+        return edge
+
+    def _solved(
+        self, values: Mapping[Unknown, float], start: Optimum | None = None, insist: bool = True
+    ) -> Optimum:
+        """Return the neighbour with some numbers prescribed."""
+        case = self.optimum.case.with_values(held(self.config, values))
+        return self.resolver.resolve(case, start, insist)
+
+    def snapped(self) -> SnappedSprings | None:
+        """Return the best choice among the springs that exist, solved again."""
+        orthosis = self.optimum.solver.walker.patient.orthosis
+        if orthosis is None or orthosis.springs is None:
+            return None
+        kinds = {u: u.numbers[0].name.removesuffix("_stiffness") for u in self.around.free}
+        springs = [u for u, kind in kinds.items() if hasattr(orthosis.springs, kind)]
+        if not springs:
+            return None
+        lists = [
+            _nearest(
+                getattr(orthosis.springs, kinds[u]), self.optimum.value(u), self.optimum.range(u)
+            )
+            for u in springs
+        ]
+        choices = [dict(zip(springs, choice, strict=True)) for choice in itertools.product(*lists)]
+        best = min(choices, key=self._estimate)
+        found = self._solved({u: spring.stiffness for u, spring in best.items()})
+        self.solves += 1
+        rise = self._estimate(best)
+        if found.converged:
+            rise = found.cost - self.optimum.cost
+        series = found.series
+        each = {name: spring for u, spring in best.items() for name in _full_names(u)}
+        return SnappedSprings(
+            {name: spring.name for name, spring in each.items()},
+            {name: spring.stiffness for name, spring in each.items()},
+            rise / abs(self.optimum.cost),
+            series.distance / series.duration,
+            found.result.status,
+        )
+
+    def _estimate(self, choice: Mapping[Unknown, RealSpring]) -> float:
+        """Return the rise of the cost to second order."""
+        return self.around.rise(
+            {u: spring.stiffness - self.optimum.value(u) for u, spring in choice.items()}
+        )
+
+
+def _full_names(unknown: Unknown) -> tuple[str, ...]:
+    return tuple(number.full_name for number in unknown.numbers)
+
+
+def _springs(verdicts: Mapping[Unknown, NumberVerdict]) -> Iterator[NumberVerdict]:
+    """Yield the verdict on every spring, in order; tied ones share theirs."""
+    of = {name: (u, v) for u, v in verdicts.items() for name in _full_names(u)}
+    for name in STIFFNESSES:
+        if name in of:
+            unknown, verdict = of[name]
+            number = next(n for n in unknown.numbers if n.full_name == name)
+            yield replace(verdict, name=name, label=Unknown.of(number).label)
+
+
+def _quadratic_edge(slope: float, curvature: float) -> float:
+    """Return the distance at which slope d + curvature d^2 / 2 reaches `SHARE` [N m/rad]."""
+    slope, curvature = max(slope, 0.0), max(curvature, 1e-9)
+    return float((np.sqrt(slope**2 + 2.0 * curvature * SHARE) - slope) / curvature)
+
+
+def _nearest(
+    springs: Sequence[RealSpring], stiffness: float, allowed: tuple[float, float]
+) -> list[RealSpring]:
+    """Return the real springs next to a stiffness, if possible those that are allowed."""
+    within = [spring for spring in springs if allowed[0] <= spring.stiffness <= allowed[1]]
+    by_distance = sorted(within or springs, key=lambda spring: abs(spring.stiffness - stiffness))
+    return by_distance[:_CANDIDATES]
+
+
+def _stops(series: GaitSeries) -> Iterator[StopVerdict]:
+    """Yield how far the ankles go into every hard stop."""
+    weights, walker = series.quadrature, series.walker
+    for side, element in walker.device.elements.items():
+        fixed, angle = element.fixed(walker.values), series.column(*element.coordinates)
+        for stop, limit, sign in (
+            ("dorsiflexion", fixed.dorsiflexion_stop, -1.0),
+            ("plantarflexion", fixed.plantarflexion_stop, 1.0),
+        ):
+            beyond = sign * (angle - limit)
+            share = float(weights @ (beyond > 0.0) / weights.sum())
+            yield StopVerdict(side, stop, float(limit), float(beyond.max()), share)
+
+
+_SOLVES: Final = 8
+"""Most solves spent on one edge."""
+
+_NEAR: Final = 0.1
+"""Share of the allowed rise by which the cost at an edge may miss it."""
+
+_STRETCH: Final = 1.3
+"""Multiple of a step up to which the limit of the range is tried at once."""
+
+Solve = Callable[[float, Optimum, bool], Optimum]
+"""Solves with the number prescribed, from a neighbour; whether to insist."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Where the cost has risen as far as allowed.
+
+    Args:
+        value: The number [its unit].
+        limit: Whether it is the limit of the range, with less than the allowed rise there.
+        rise: Rise of the cost there, as a share.
+        certain: Whether solves enclose it; otherwise it is the last one that was solved.
+        again: Whether the cost is good again at the limit of the range: another local optimum.
+        solves: Number of solves.
+        iterations: Their iterations.
+    """
+
+    value: float
+    limit: bool
+    rise: float
+    certain: bool
+    solves: int
+    iterations: int
+    again: bool = False
+
+
+@dataclass
+class _Search:
+    """A search in one direction: the last point inside, and the first one outside if known."""
+
+    inside: Optimum
+    at: float
+    rise: float = 0.0
+    outside: float | None = None
+    outside_rise: float = 0.0
+    solves: int = 0
+    iterations: int = 0
+
+
+def find_edge(
+    solve: Solve,
+    optimum: Optimum,
+    start: float,
+    limit: float,
+    share: float,
+    step: float,
+    look: bool = True,
+) -> Edge:
+    """Return where the cost has risen by a share, or the limit of the range.
+
+    Args:
+        solve: Solves with the number prescribed; the others follow.
+        optimum: The optimum.
+        start: Its value there.
+        limit: The end of the range in the direction of the search.
+        share: Allowed rise of the cost relative to its size, e.g. 0.05.
+        step: Expected distance to the edge, positive.
+        look: Whether to look at the limit for another optimum, where the edge lies before it.
+    """
+    search = _Search(optimum, start)
+    sign, size = (1.0 if limit > start else -1.0), abs(optimum.cost)
+    while search.solves < _SOLVES and search.at != limit:
+        if search.outside is None:
+            trial = search.at + sign * step
+            if abs(limit - search.at) <= _STRETCH * step:
+                trial = limit
+        else:
+            trial = _between(search, share)
+        found = solve(trial, search.inside, True)
+        search.solves += 1
+        search.iterations += found.result.iterations
+        if not found.converged:
+            step = abs(trial - search.at) / 2.0
+            search.outside = None
+            continue
+        rise = (found.cost - optimum.cost) / size
+        if rise <= share * (1.0 + _NEAR):
+            search.inside, search.at, search.rise = found, trial, rise
+            step = max(step, 2.0 * abs(trial - start))
+        else:
+            search.outside, search.outside_rise = trial, rise
+        if abs(rise - share) <= _NEAR * share and trial != limit:
+            edge = Edge(trial, False, rise, True, search.solves, search.iterations)
+            return (
+                _looked_beyond(edge, solve, optimum, search.inside, limit, share) if look else edge
+            )
+    limited = search.at == limit
+    return Edge(search.at, limited, search.rise, limited, search.solves, search.iterations)
+
+
+def _looked_beyond(
+    edge: Edge, solve: Solve, optimum: Optimum, inside: Optimum, limit: float, share: float
+) -> Edge:
+    """Return an edge inside the range, after one look at the limit."""
+    found = solve(limit, inside, False)
+    again = found.converged and found.cost - optimum.cost <= share * abs(optimum.cost)
+    iterations = edge.iterations + found.result.iterations
+    return replace(edge, again=again, solves=edge.solves + 1, iterations=iterations)
+
+
+def _between(search: _Search, share: float) -> float:
+    """Return where the cost should meet the share, between the points inside and outside."""
+    assert search.outside is not None  # noqa: S101 - called once a point outside is known
+    part = (share - search.rise) / (search.outside_rise - search.rise)
+    # the cost is convex near its optimum: the true edge lies beyond the secant's
+    part = min(max(part**0.5 if search.rise <= 0.0 else part, 0.1), 0.9)
+    return search.at + part * (search.outside - search.at)
