@@ -23,8 +23,8 @@ from pathwalker_cli.io.fields import described, field_at, is_model
 from pathwalker_cli.patient import OrthosisData, Patient
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.starter.files import explained_keys
-from pathwalker_cli.studies import STUDIES as AROUND
 from pathwalker_cli.studies.batch.schema import BatchStudy
+from pathwalker_cli.studies.registry import STUDIES as AROUND
 
 PAGE: Final = Path(__file__).with_name("configuration.md")
 CONFIGS: Final = PAGE.parent.parent / "configs"

@@ -16,7 +16,7 @@ from pathwalker_cli import __version__
 from pathwalker_cli.commands.examples import examples_epilog
 from pathwalker_cli.commands.options import print_failure
 from pathwalker_cli.errors import NotConvergedError, PathwalkerError
-from pathwalker_cli.studies import STUDIES
+from pathwalker_cli.studies.registry import STUDIES
 
 __all__ = ["COMMANDS", "GROUPS", "NOT_CONVERGED", "REFUSED", "STOPPED", "cli", "main"]
 

@@ -38,8 +38,8 @@ from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient, shipped_patients
 from pathwalker_cli.problems import problem_named
 from pathwalker_cli.results.text import orthosis_rows
-from pathwalker_cli.studies import STUDIES
 from pathwalker_cli.studies.batch.schema import BatchStudy
+from pathwalker_cli.studies.registry import STUDIES
 
 __all__ = ["KINDS", "another_kind", "check_file", "check_orthosis"]
 

@@ -9,9 +9,9 @@ from pathwalker_cli.checking.patient import walker_rows
 from pathwalker_cli.checking.prediction import described, ready_solver
 from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.errors import placed
-from pathwalker_cli.studies import STUDIES
 from pathwalker_cli.studies.base import base_case, load_study
 from pathwalker_cli.studies.batch.cases import load_cases
+from pathwalker_cli.studies.registry import STUDIES
 
 __all__ = ["check_batch", "check_study"]
 

@@ -10,7 +10,7 @@ from typing import Final
 import click
 from click.shell_completion import CompletionItem
 
-from pathwalker_cli.studies import STUDIES
+from pathwalker_cli.studies.registry import STUDIES
 
 __all__ = [
     "complete_configs",

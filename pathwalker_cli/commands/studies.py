@@ -19,7 +19,7 @@ from pathwalker_cli.commands.options import (
     quiet_option,
     set_option,
 )
-from pathwalker_cli.studies import STUDIES
+from pathwalker_cli.studies.registry import STUDIES
 
 if TYPE_CHECKING:
     from pathwalker_cli.results.run_folder import Run

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pathwalker_cli import studies
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.io.yaml_file import validate
 from pathwalker_cli.report.summaries import SUMMARIES, Summary
+from pathwalker_cli.studies import registry
 
 __all__ = ["STUDIES", "Kind", "Study", "folder_kind", "sorted_folders", "studies_near"]
 
@@ -20,7 +20,7 @@ Kind = str
 """A run, recorded gait, a cohort, or the command of a study."""
 
 STUDIES: Final[Mapping[Kind, str]] = {
-    kind: studies.STUDIES[kind].summary for kind in dict.fromkeys((*SUMMARIES, *studies.STUDIES))
+    kind: registry.STUDIES[kind].summary for kind in dict.fromkeys((*SUMMARIES, *registry.STUDIES))
 }
 """The studies around an optimum and their summaries, in the order of a page."""
 

@@ -16,9 +16,9 @@ from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.springs import recommended
 from pathwalker_cli.report.study_files import Spreads, landscape_of, spreads_of
 from pathwalker_cli.stride.measures import measure_of, measures_in
-from pathwalker_cli.studies import STUDIES
 from pathwalker_cli.studies.landscape.figures import Chosen
 from pathwalker_cli.studies.measures import COMPARED
+from pathwalker_cli.studies.registry import STUDIES
 from pathwalker_cli.studies.sensitivity.result import label_of
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, tradeoff_of_content
 from pathwalker_cli.studies.uncertainty.result import Spread, shown_text
