@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
-from pathwalker_cli.studies.registry import STUDIES
 
 import speeds_study
 from made_neighbours import MadeResolver, made_measures, made_run
@@ -26,6 +25,7 @@ from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies.base import Plan, Work
 from pathwalker_cli.studies.landscape import LandscapeStudy, varied_springs
 from pathwalker_cli.studies.perturbation import PerturbationStudy, moved_numbers
+from pathwalker_cli.studies.registry import STUDIES
 
 BAREFOOT = ("base=mapd-barefoot",)
 FIT = ("base=ls-barefoot",)

@@ -13,8 +13,6 @@ from pathwalker_cli.patient.blocks import Strengths
 from pathwalker_cli.patient.file import healthy_strength
 from pathwalker_cli.results.text import notes_together, orthosis_rows
 
-__all__ = ["orthosis_content", "patient_content", "patient_remarks", "patient_rows", "walker_rows"]
-
 
 def walker_rows(walker: Walker) -> list[Row]:
     """Return who walks, and what is worn."""

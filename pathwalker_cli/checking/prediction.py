@@ -27,8 +27,6 @@ from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.results.run_folder import ENTRIES, check_target, default_folder
 from pathwalker_cli.studies.batch.cases import check_patient
 
-__all__ = ["FIXED", "MEASURED", "check_prediction", "described", "expected", "ready_solver"]
-
 
 @dataclass(frozen=True)
 class Measured:

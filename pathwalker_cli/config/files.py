@@ -12,7 +12,8 @@ from pydantic import BaseModel
 from pathwalker_cli.config.schema import StudyConfig
 from pathwalker_cli.config.values import apply_change
 from pathwalker_cli.errors import ConfigError, did_you_mean
-from pathwalker_cli.io.yaml_file import KeyPath, Lines, read_mapping, validate
+from pathwalker_cli.io.refusals import KeyPath, Lines
+from pathwalker_cli.io.yaml_file import read_mapping, validate
 from pathwalker_cli.paths import shipped
 
 Model = TypeVar("Model", bound=BaseModel)

@@ -7,7 +7,8 @@ from typing import Any, Final
 
 from pathwalker_cli.config.schema import StudyConfig, merged
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.io.yaml_file import KeyPath, read_value, validate
+from pathwalker_cli.io.refusals import KeyPath
+from pathwalker_cli.io.yaml_file import read_value, validate
 from pathwalker_cli.model.contact import PHASE_NAMES
 
 NO_VALUE: Final = "-"

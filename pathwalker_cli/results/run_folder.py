@@ -49,20 +49,6 @@ from pathwalker_cli.results.text import shortfall_text
 from pathwalker_cli.stride.figures import save_figures
 from pathwalker_cli.stride.series import GaitSeries
 
-__all__ = [
-    "CONFIG",
-    "ENTRIES",
-    "PATIENT",
-    "Run",
-    "check_target",
-    "claimed_run",
-    "default_folder",
-    "load_run",
-    "release_runs",
-    "warm_start_run",
-    "write_run",
-]
-
 CONFIG: Final = "config.resolved.yaml"
 """The config of a run with every value written out."""
 PATIENT: Final = "patient.yaml"

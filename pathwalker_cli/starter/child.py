@@ -14,8 +14,6 @@ from pathwalker_cli.errors import PatientError
 from pathwalker_cli.patient import JENSEN_AGES
 from pathwalker_cli.patient.file import healthy_child, healthy_strength
 
-__all__ = ["AGE", "Child", "made_child"]
-
 AGE: Final = 9.0
 """Age of a child of which nothing is said [years]."""
 

@@ -24,8 +24,6 @@ from pathwalker_cli.results.run_folder import (
 from pathwalker_cli.studies.judge import verdict_of
 from pathwalker_cli.studies.verdict import Verdict, verdict_lines
 
-__all__ = ["Outcome", "RunLog", "done_run", "run_study"]
-
 
 class Outcome(NamedTuple):
     """How a study ended.

@@ -27,8 +27,6 @@ from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.stride.verify import equation_residual, reintegrate, second_engine_residual
 
-__all__ = ["Check", "Verification", "verify_run"]
-
 _SAME: Final = 1e-6
 """Relative difference up to which two numbers of a file count as the same."""
 _EQUATIONS: Final = 1e-6

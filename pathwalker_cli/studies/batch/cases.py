@@ -29,17 +29,6 @@ from pathwalker_cli.studies.batch.schema import (
     slug,
 )
 
-__all__ = [
-    "Batch",
-    "BatchCase",
-    "check_case",
-    "check_patient",
-    "check_warm_start",
-    "listed_patients",
-    "listed_problems",
-    "load_cases",
-]
-
 
 @dataclass(frozen=True)
 class BatchCase:
