@@ -24,7 +24,7 @@ from report import Cell, Report
 from rich.console import Console
 
 from pathwalker_cli.gait.solution import TOO_WEAK
-from pathwalker_cli.model.healthy import healthy_strength
+from pathwalker_cli.patient.file import healthy_strength
 from pathwalker_cli.starter.child import made_child
 from pathwalker_cli.starter.files import folder_files
 

@@ -18,8 +18,6 @@ from pathwalker_cli.patient.variation import varied
 if TYPE_CHECKING:
     from pathwalker_cli.model.walker import Walker
 
-__all__ = ["Case", "config_text", "load_case"]
-
 
 @dataclass(frozen=True)
 class Case:

@@ -18,8 +18,6 @@ from pathwalker_cli.commands.options import print_failure
 from pathwalker_cli.errors import NotConvergedError, PathwalkerError
 from pathwalker_cli.studies.registry import STUDIES
 
-__all__ = ["COMMANDS", "GROUPS", "NOT_CONVERGED", "REFUSED", "STOPPED", "cli", "main"]
-
 NOT_CONVERGED: Final = 1
 """Exit code of a solve that did not converge."""
 REFUSED: Final = 2

@@ -7,18 +7,6 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Self
 
-__all__ = [
-    "BackendError",
-    "ConfigError",
-    "DataError",
-    "InputError",
-    "NotConvergedError",
-    "PathwalkerError",
-    "PatientError",
-    "did_you_mean",
-    "placed",
-]
-
 
 class PathwalkerError(Exception):
     """Root of all errors that PathWalker raises on purpose."""

@@ -9,8 +9,6 @@ from typing import Any, Final, Literal
 from pathwalker_cli.conventions import Condition
 from pathwalker_cli.errors import ConfigError, did_you_mean
 
-__all__ = ["PROBLEMS", "Problem", "problem_named"]
-
 
 @dataclass(frozen=True)
 class Problem:

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-__all__ = ["Trajectory"]
-
 
 @dataclass(frozen=True)
 class Trajectory:

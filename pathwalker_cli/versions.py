@@ -10,8 +10,6 @@ from typing import Final
 
 from pathwalker_cli import __version__
 
-__all__ = ["MISSING", "today", "versions"]
-
 MISSING: Final = "missing"
 """Stands for the version of a package that is not installed."""
 

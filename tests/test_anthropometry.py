@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pathwalker_cli.conventions import Condition
-from pathwalker_cli.model.anthropometry import Segment, segments, total_mass
+from pathwalker_cli.model.anthropometry import Segment, segments
 from pathwalker_cli.patient import load_patient
 
 PATIENT = "sreenivasa2017-patient"
@@ -43,7 +43,8 @@ def upper_body(found: dict[str, Segment]) -> tuple[float, float, float]:
     ],
 )
 def test_total_mass(name: str, condition: Condition, expected: float) -> None:
-    assert total_mass(segments(load_patient(name), condition)) == pytest.approx(expected, abs=1e-5)
+    masses = [part.mass for part in segments(load_patient(name), condition)]
+    assert sum(masses) == pytest.approx(expected, abs=1e-5)
 
 
 @pytest.mark.parametrize(

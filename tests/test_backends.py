@@ -14,8 +14,13 @@ from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES
 from pathwalker_cli.errors import BackendError
 from pathwalker_cli.model import backends
 from pathwalker_cli.model.backends import bindings, compiled
-from pathwalker_cli.model.backends.functions import SIGNATURES
-from pathwalker_cli.model.backends.topology import Topology, all_parameters
+from pathwalker_cli.model.backends.functions import (
+    SIGNATURES,
+    RigidBodyFunctions,
+    Topology,
+    all_parameters,
+    parameters_of,
+)
 
 TOLERANCE = 1e-10
 STATES = 200
@@ -90,7 +95,7 @@ def numeric(
 
 
 def assert_agrees(
-    functions: backends.RigidBodyFunctions, model: pin.Model, theta: np.ndarray, states: int
+    functions: RigidBodyFunctions, model: pin.Model, theta: np.ndarray, states: int
 ) -> None:
     rng = np.random.default_rng(7)
     for _ in range(states):
@@ -182,7 +187,7 @@ def test_another_topology_is_refused() -> None:
 
 def test_an_unknown_parameter_is_named() -> None:
     with pytest.raises(BackendError, match=r"no parameter wing\.mass"):
-        backends.parameters_of(walker(0), CONTACT_POINTS, ("wing.mass",))
+        parameters_of(walker(0), CONTACT_POINTS, ("wing.mass",))
 
 
 def test_the_report_names_every_back_end() -> None:

@@ -33,7 +33,7 @@ def test_work_is_energy_and_impulse_is_momentum(gait: GaitSeries) -> None:
     ("column", "factor", "fails"),
     [
         ("force", 1.01, ("impulse", "angular_impulse")),
-        ("muscle_torque", 1.01, ("energy",)),
+        ("element_force", 1.01, ("energy",)),
         ("v", 1.01, ("energy", "impulse")),
     ],
 )

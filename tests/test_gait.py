@@ -11,13 +11,13 @@ import pytest
 from scipy.linalg.lapack import dtrtri
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.config import BoundsConfig, StudyConfig, load_config
+from pathwalker_cli.config import BoundsConfig, MeshConfig, StudyConfig, load_config
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.recorded import recorded_stride
 from pathwalker_cli.gait.solve import GaitSolver, solve_study
-from pathwalker_cli.gait.start import recorded_stride
 from pathwalker_cli.io.recordings import read_recording
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import build_walker
@@ -42,7 +42,7 @@ def solver() -> GaitSolver:
 def program(solver: GaitSolver) -> CollocationProgram:
     guess, costs = solver.parameter_guess(), len(solver.gait.costs.integrals)
     motion = solver.stride.motion(solver.walker, guess, meshing.uniform([2] * 8), 3, costs)
-    numbers = solver.numbers(solver.weights, solver.bounds.table)
+    numbers = solver.prediction
     return CollocationProgram(solver.blocks, numbers, motion.meshes)
 
 
@@ -62,7 +62,7 @@ def test_frozen_curves_give_the_torques_and_their_derivatives(solver: GaitSolver
     rng = np.random.default_rng(5)
     x = 0.3 * rng.normal(size=block.expressions.unknowns.numel())
     data = np.concatenate([[0.1, 0.5], np.zeros(10)])
-    shared = solver.numbers(solver.weights, solver.bounds.table).shared
+    shared = solver.prediction.shared
     jacobian = np.asarray(ca.DM(jacobian_of(x, data, shared)[0]))
     lam = rng.normal(size=block.rows)
     hessian = np.asarray(ca.DM(hessian_of(x, data, shared, 0.0, lam)))
@@ -174,7 +174,7 @@ def test_mesh_follows_durations_and_errors() -> None:
         tuple(np.array([0.0] * (len(m) - 2) + [0.1]) for m in meshes),
         tuple(np.zeros(len(m) - 1) for m in meshes),
     )
-    finer = meshing.refined(meshes, errors, 1e-3, 1e-2, order=3)
+    finer = meshing.refined(meshes, errors, MeshConfig())
     assert [len(mesh) - 1 for mesh in finer] == [13, 33, 6]
     assert all(np.all(np.diff(mesh) > 0) for mesh in finer)
 

@@ -10,10 +10,10 @@ import pytest
 
 from helpers import stylised_series
 from pathwalker_cli.config import load_config, smoke_version, with_values
-from pathwalker_cli.conventions import COORDINATES, GENERATORS
+from pathwalker_cli.conventions import ANGLES, COORDINATES, GENERATORS
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.cost_terms import goal_values, with_goal_costs
-from pathwalker_cli.gait.costs import COMFORT_COORDINATES, GOALS, Costs, Instant, Totals
+from pathwalker_cli.gait.costs import GOALS, Costs, Instant, Totals
 from pathwalker_cli.gait.solve import solve_study
 from pathwalker_cli.model.contact import PHASES, phase_named
 from pathwalker_cli.ocp.phased import PhasedMotion
@@ -169,5 +169,5 @@ def test_goals_that_cannot_be_are_refused(
 
 
 def test_ranges_are_of_coordinates_that_are_angles() -> None:
-    assert "pelvis_tz" not in COMFORT_COORDINATES
-    assert len(COMFORT_COORDINATES) == 8
+    assert "pelvis_tz" not in ANGLES
+    assert len(ANGLES) == 8

@@ -26,9 +26,9 @@ from pathwalker_cli.inverse.trials import c3d_trial
 from pathwalker_cli.io.c3d import ForcePlate
 from pathwalker_cli.io.commented_yaml import entries, reasons
 from pathwalker_cli.io.fields import Sides
-from pathwalker_cli.model.healthy import healthy_child, healthy_strength
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import OrthosisData, Patient, load_patient
+from pathwalker_cli.patient.file import healthy_child, healthy_strength
 from pathwalker_cli.starter import example
 from pathwalker_cli.starter.child import made_child
 from pathwalker_cli.starter.configs import WIDTH

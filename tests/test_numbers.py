@@ -118,7 +118,7 @@ def test_residuals_are_those_of_the_walker_with_these_numbers(solver: GaitSolver
     inside = [np.mean(solver.bounds.ranges[unknown.name]) for unknown in unknowns]
     x[1 : 1 + len(unknowns)] = np.array(inside) / problem.parameters.scale
     data = np.concatenate([[0.1, 0.5], np.zeros(len(COORDINATES))])
-    shared = solver.numbers(solver.weights, solver.bounds.table).shared
+    shared = solver.prediction.shared
     jacobian = np.asarray(ca.DM(jacobian_of(x, data, shared)[0]))
     lam = rng.normal(size=block.rows)
     hessian = np.asarray(ca.DM(hessian_of(x, data, shared, 0.0, lam)))

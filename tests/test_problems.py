@@ -13,8 +13,8 @@ from pathwalker_cli.case import Case, load_case
 from pathwalker_cli.config import StudyConfig, load_config, smoke_version
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, mirror_permutation, mirrored
 from pathwalker_cli.errors import ConfigError, DataError
-from pathwalker_cli.gait.by_shooting import solve_by_shooting
-from pathwalker_cli.gait.passage import passage_samples, recorded_passage
+from pathwalker_cli.gait.recorded import passage_samples, recorded_passage
+from pathwalker_cli.gait.shooting import solve_by_shooting
 from pathwalker_cli.gait.solve import GaitSolver, solve_study
 from pathwalker_cli.gait.starts import solve_from_starts, spread_starts
 from pathwalker_cli.gait.symmetry import asymmetries

@@ -15,6 +15,7 @@ from helpers import stylised_series, walker_of
 from pathwalker_cli.case import load_case
 from pathwalker_cli.config import load_config
 from pathwalker_cli.gait.bounds import gait_bounds
+from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.shooting import (
     EXCITATIONS,
@@ -353,14 +354,16 @@ def test_barefoot_prediction_agrees_with_collocation() -> None:
     solution = solver.solve(coarse.last_motion)
     assert solution.converged
     motion = solution.last_motion
-    numbers = solver.numbers(solver.weights, solver.bounds.table)
+    numbers = solver.prediction
     shot = solve_shooting(solver.gait, numbers, motion)
     assert shot.converged
     assert shot.violations[0].amount < 1e-6
     assert shot.integration_error < 1e-4
     assert shot.defect < 1e-5
     assert shot.cost == pytest.approx(solution.cost, rel=1e-2)
-    assert shot.durations.sum() == pytest.approx(motion.duration, rel=1e-2)
-    assert shot.durations == pytest.approx(motion.durations, abs=1e-2 * motion.duration)
+    durations = shot.nodes.durations
+    assert durations.sum() == pytest.approx(motion.duration, rel=1e-2)
+    assert durations == pytest.approx(motion.durations, abs=1e-2 * motion.duration)
     series = solution.series
-    assert shot.walking_speed == pytest.approx(series.distance / series.duration, rel=1e-2)
+    speed = walked_distance(shot.motion) / shot.motion.duration
+    assert speed == pytest.approx(series.distance / series.duration, rel=1e-2)

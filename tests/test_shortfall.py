@@ -10,12 +10,17 @@ import pytest
 
 from helpers import stylised_series, walker_of
 from pathwalker_cli.case import load_case
-from pathwalker_cli.config import load_config
+from pathwalker_cli.config import MeshConfig, load_config
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import gait_bounds, helped_bounds
-from pathwalker_cli.gait.shortfall import MissingTorque, Shortfall, missing_torques
-from pathwalker_cli.gait.solution import TOO_WEAK, GaitSolution
+from pathwalker_cli.gait.solution import (
+    TOO_WEAK,
+    GaitSolution,
+    MissingTorque,
+    Shortfall,
+    missing_torques,
+)
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.results.text import failure_text, shortfall_text
 
@@ -103,7 +108,7 @@ def test_bounds_that_contradict_each_other_are_not_blamed_on_muscles() -> None:
 def test_late_rounds_split_what_just_met_the_tolerance() -> None:
     meshes = (np.linspace(0.0, 1.0, 5),)
     errors = meshing.Reintegration((np.array([0.0, 5e-4, 1e-4, 2e-3]),), (np.zeros(4),))
-    early, late = (meshing.refined(meshes, errors, 1e-3, 1e-2, 3, s)[0] for s in (1.0, 0.3))
+    early, late = (meshing.refined(meshes, errors, MeshConfig(), s)[0] for s in (1.0, 0.3))
     assert len(late) > len(early)
     assert 0.375 in late
     assert 0.375 not in early

@@ -14,9 +14,9 @@ import pytest
 import pathwalker_cli
 from pathwalker_cli.case import load_case
 from pathwalker_cli.gait import mesh as meshing
-from pathwalker_cli.gait import structures
+from pathwalker_cli.gait import problem
+from pathwalker_cli.gait.problem import gait_blocks
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.gait.structures import gait_blocks
 from pathwalker_cli.nlp import tape_store
 from pathwalker_cli.nlp.assembly import KINDS
 from pathwalker_cli.nlp.blocks import Expressions
@@ -75,7 +75,7 @@ def test_other_code_or_versions_find_nothing(folder: Path, monkeypatch: pytest.M
 
 
 def test_other_versions_have_another_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert pin.__version__ in structures._MAKERS
+    assert pin.__version__ in problem._MAKERS
     names = [tape_store._made_by.__wrapped__(makers) for makers in (("1.0",), ("0.0",))]
     monkeypatch.setattr(np, "__version__", "0.0")
     names.append(tape_store._made_by.__wrapped__(("1.0",)))
@@ -85,7 +85,7 @@ def test_other_versions_have_another_name(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_sources_and_libraries_are_in_the_name(monkeypatch: pytest.MonkeyPatch) -> None:
     package = Path(pathwalker_cli.__file__).parent
-    files = list(tape_store._maker_files(package, structures._MAKERS))
+    files = list(tape_store._maker_files(package, problem._MAKERS))
     assert {*package.rglob("*.py")} < {*files}
     assert {file.name for file in files if file.suffix == ".so"} == {
         kernels_path().name,

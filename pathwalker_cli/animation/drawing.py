@@ -14,8 +14,6 @@ from pathwalker_cli.animation.frames import GaitFrames
 from pathwalker_cli.conventions import GENERATORS, SIDES, SUFFIX, Side
 from pathwalker_cli.stride.figures.style import FORCE_LENGTH
 
-__all__ = ["Drawing", "Shape", "View", "common_view", "drawing", "force_scale", "words"]
-
 Kind = Literal["leg", "foot", "trunk", "head", "muscle", "shell", "spring"]
 
 _LINE: Final = np.array([[0.0, 0.0], [1.0, 0.0]])

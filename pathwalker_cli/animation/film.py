@@ -51,8 +51,6 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import output_path
 from pathwalker_cli.stride.figures.style import BODY_COLOUR, FORCE_COLOUR, STYLE
 
-__all__ = ["MOST_FRAMES", "film_rate", "write_film"]
-
 MOST_FRAMES: Final = 3000
 """Frames of the longest film: a GIF is put together in memory."""
 

@@ -21,8 +21,6 @@ from pathwalker_cli.stride.stride import (
     switching_times,
 )
 
-__all__ = ["GaitFrames", "gait_frames", "run_frames"]
-
 _CLOSED: Final = 1e-3
 """Difference between beginning and end of a stride [m, rad] below which it repeats itself."""
 

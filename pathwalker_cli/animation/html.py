@@ -34,8 +34,6 @@ from pathwalker_cli.conventions import GENERATORS, SIDES
 from pathwalker_cli.io.templates import templates
 from pathwalker_cli.stride.figures.style import BODY_COLOUR, FORCE_COLOUR
 
-__all__ = ["RATE", "html_page"]
-
 RATE: Final = 100.0
 """Instants of the page per second of gait [1/s]; between them the page interpolates."""
 

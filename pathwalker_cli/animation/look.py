@@ -11,19 +11,6 @@ from pathwalker_cli.animation.frames import GaitFrames
 from pathwalker_cli.conventions import Side
 from pathwalker_cli.stride.figures.style import BODY_COLOUR, FORCE_COLOUR, LINE_COLOUR
 
-__all__ = [
-    "ACTIVATION_COLOURS",
-    "CAVEAT",
-    "DASHES",
-    "SHELL_COLOUR",
-    "SPRING_COLOUR",
-    "Look",
-    "arrow_look",
-    "pace",
-    "shape_look",
-    "subtitle",
-]
-
 ACTIVATION_COLOURS: Final = (
     "#ffffe5",
     "#fff7bc",

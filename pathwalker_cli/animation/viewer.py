@@ -19,8 +19,6 @@ from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import body_points
 
-__all__ = ["open_viewer", "poses", "show", "walker_geometry"]
-
 _RATE: Final = 60.0
 """Pictures per second [1/s]."""
 _EYE: Final = [1.2, 0.9, 2.0]

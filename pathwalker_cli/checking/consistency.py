@@ -18,8 +18,6 @@ from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.patient import OrthosisData, Patient
 from pathwalker_cli.patient.proportions import SOURCE, default_length
 
-__all__ = ["contradictions", "odd_orthosis", "odd_patient", "oddities"]
-
 _BODY_MASS_INDEX: Final = (11.0, 40.0)
 """[kg/m^2] Wider than three standard deviations at any age in de Onis et al. (2007), Development of
 a WHO growth reference for school-aged children and adolescents."""

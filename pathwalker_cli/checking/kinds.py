@@ -41,8 +41,6 @@ from pathwalker_cli.results.text import orthosis_rows
 from pathwalker_cli.studies.batch.schema import BatchStudy
 from pathwalker_cli.studies.registry import STUDIES
 
-__all__ = ["KINDS", "another_kind", "check_file", "check_orthosis"]
-
 
 def check_kinematics(path: str, changes: Changes = ()) -> Checked:
     """Return what `ik` would do."""

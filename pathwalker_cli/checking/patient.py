@@ -7,13 +7,11 @@ from typing import Any
 
 from pathwalker_cli.checking.consistency import odd_patient
 from pathwalker_cli.checking.report import Row
-from pathwalker_cli.model.healthy import healthy_strength
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import Strengths
+from pathwalker_cli.patient.file import healthy_strength
 from pathwalker_cli.results.text import notes_together, orthosis_rows
-
-__all__ = ["orthosis_content", "patient_content", "patient_remarks", "patient_rows", "walker_rows"]
 
 
 def walker_rows(walker: Walker) -> list[Row]:

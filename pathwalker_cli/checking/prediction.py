@@ -27,8 +27,6 @@ from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.results.run_folder import ENTRIES, check_target, default_folder
 from pathwalker_cli.studies.batch.cases import check_patient
 
-__all__ = ["FIXED", "MEASURED", "check_prediction", "described", "expected", "ready_solver"]
-
 
 @dataclass(frozen=True)
 class Measured:
@@ -229,7 +227,7 @@ def _rows(solver: GaitSolver, content: Mapping[str, Any], seconds: Seconds) -> I
 
 def _weights(solver: GaitSolver) -> dict[str, float]:
     """Return the terms of the objective with their weights; those without any are left out."""
-    weights = solver.weights
+    weights = solver.config.cost.weights
     if not solver.config.fits:
         weights |= {"fit": 0.0, "excitation": 0.0}
     named = {

@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from textwrap import wrap
 from typing import Any, Final
 
-__all__ = ["Changes", "Checked", "Row", "checked_lines"]
-
 _WIDTH: Final = 80
 _COLUMN: Final = 20
 

@@ -13,8 +13,6 @@ from pathwalker_cli.studies.base import base_case, load_study
 from pathwalker_cli.studies.batch.cases import load_cases
 from pathwalker_cli.studies.registry import STUDIES
 
-__all__ = ["check_batch", "check_study"]
-
 
 def check_study(command: str, path: str, changes: Changes = ()) -> Checked:
     """Return what the command of a study around an optimum would do.

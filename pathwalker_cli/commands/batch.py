@@ -21,8 +21,6 @@ from pathwalker_cli.commands.options import (
 if TYPE_CHECKING:
     from pathwalker_cli.studies.batch.worker import Pool
 
-__all__ = ["batch_command"]
-
 
 @click.command("batch")
 @click.argument("study", metavar="STUDY", shell_complete=complete_configs)

@@ -13,8 +13,6 @@ from pathwalker_cli.commands.options import json_option, print_json, set_option
 if TYPE_CHECKING:
     from pathwalker_cli.checking.report import Checked
 
-__all__ = ["check_command"]
-
 _REFUSED = 2
 
 

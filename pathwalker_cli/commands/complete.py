@@ -12,14 +12,6 @@ from click.shell_completion import CompletionItem
 
 from pathwalker_cli.studies.registry import STUDIES
 
-__all__ = [
-    "complete_configs",
-    "complete_keys",
-    "complete_patients",
-    "complete_problems",
-    "complete_runs",
-]
-
 _DEEPEST: Final = 3
 _MOST_FOLDERS: Final = 300
 """How far and wide runs are looked for below a folder: an answer must come within a keystroke."""

@@ -10,8 +10,6 @@ import click
 
 from pathwalker_cli.commands.options import json_option, print_json
 
-__all__ = ["Finding", "doctor_command", "findings"]
-
 
 @dataclass(frozen=True)
 class Finding:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from itertools import groupby
 from typing import Final
 
-__all__ = ["EXAMPLES", "examples_epilog"]
-
 _LINES: Final = """
 pathwalker solve mapd-orthosis mapd-orthosis
 pathwalker solve mapd-barefoot mapd-barefoot.yaml --out runs/barefoot

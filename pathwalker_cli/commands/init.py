@@ -6,8 +6,6 @@ from pathlib import Path
 
 import click
 
-__all__ = ["init_command"]
-
 
 @click.command("init")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))

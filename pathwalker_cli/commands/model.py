@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from pathwalker_cli.model.anthropometry import Segment
     from pathwalker_cli.patient import Patient
 
-__all__ = ["model_command"]
-
 
 @click.command("model")
 @click.argument("patient", metavar="PATIENT", shell_complete=complete_patients)

@@ -12,17 +12,6 @@ import click
 from pathwalker_cli.commands.complete import complete_keys, complete_runs
 from pathwalker_cli.errors import ConfigError
 
-__all__ = [
-    "json_option",
-    "meant_as",
-    "out_option",
-    "print_failure",
-    "print_json",
-    "quiet_option",
-    "runs_argument",
-    "set_option",
-]
-
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 _WANTED: Final = "pathwalker.json.wanted"

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from pathwalker_cli.nlp.watch import ProgressReport
     from pathwalker_cli.studies.batch.ledger import Ended
 
-__all__ = ["BatchProgress", "Progress"]
-
 EVERY: Final = 20
 """Iterations between two plain lines."""
 PAUSE: Final = 0.1

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     Config = TypeVar("Config", bound=RecordedConfig)
 
-__all__ = ["id_command", "ik_command", "import_command"]
-
 _OUT = out_option("Output folder.", metavar=None)
 _QUIET = click.option("--quiet", is_flag=True, help="Print warnings only.")
 _SET = set_option("Override a config value.")

@@ -12,8 +12,6 @@ from pathwalker_cli.commands.options import out_option, quiet_option
 if TYPE_CHECKING:
     from pathwalker_cli.case import Case
 
-__all__ = ["reproduce_command"]
-
 
 @click.command("reproduce")
 @out_option(

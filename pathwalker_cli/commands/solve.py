@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from pathwalker_cli.case import Case
     from pathwalker_cli.studies.run import Outcome
 
-__all__ = ["solve_command"]
-
 
 @click.command("solve")
 @click.argument("problem", metavar="PROBLEM", shell_complete=complete_problems)

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from pathwalker_cli.results.run_folder import Run
     from pathwalker_cli.studies.base import NeighbourStudy, StudyKind
 
-__all__ = ["StudyCall", "study_command"]
-
 
 @dataclass(frozen=True)
 class StudyCall:

@@ -17,8 +17,6 @@ from pathwalker_cli.commands.options import (
     runs_argument,
 )
 
-__all__ = ["rerun_command", "verify_command"]
-
 
 @click.command("verify")
 @runs_argument()

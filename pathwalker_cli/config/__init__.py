@@ -1,41 +1,15 @@
 """Study configs: what they hold, how they are read, and how single values are overridden."""
 
-from __future__ import annotations
-
-from pathwalker_cli.config.files import (
-    config_content,
-    find_config,
-    load_config,
-    patient_path,
-    place_of,
-    read_config,
-)
-from pathwalker_cli.config.overrides import apply_change, smoke_version, with_values
-from pathwalker_cli.config.schema import (
-    BoundsConfig,
-    CostConfig,
-    MeshConfig,
-    ModelConfig,
-    SolverConfig,
-    StartConfig,
-    StudyConfig,
-)
-
-__all__ = [
-    "BoundsConfig",
-    "CostConfig",
-    "MeshConfig",
-    "ModelConfig",
-    "SolverConfig",
-    "StartConfig",
-    "StudyConfig",
-    "apply_change",
-    "config_content",
-    "find_config",
-    "load_config",
-    "patient_path",
-    "place_of",
-    "read_config",
-    "smoke_version",
-    "with_values",
-]
+from pathwalker_cli.config.files import config_content as config_content
+from pathwalker_cli.config.files import find_config as find_config
+from pathwalker_cli.config.files import load_config as load_config
+from pathwalker_cli.config.files import patient_path as patient_path
+from pathwalker_cli.config.files import place_of as place_of
+from pathwalker_cli.config.files import read_config as read_config
+from pathwalker_cli.config.schema import BoundsConfig as BoundsConfig
+from pathwalker_cli.config.schema import MeshConfig as MeshConfig
+from pathwalker_cli.config.schema import StartConfig as StartConfig
+from pathwalker_cli.config.schema import StudyConfig as StudyConfig
+from pathwalker_cli.config.values import apply_change as apply_change
+from pathwalker_cli.config.values import smoke_version as smoke_version
+from pathwalker_cli.config.values import with_values as with_values

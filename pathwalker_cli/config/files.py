@@ -9,20 +9,12 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from pathwalker_cli.config.overrides import apply_change
 from pathwalker_cli.config.schema import StudyConfig
+from pathwalker_cli.config.values import apply_change
 from pathwalker_cli.errors import ConfigError, did_you_mean
-from pathwalker_cli.io.yaml_file import KeyPath, Lines, read_mapping, validate
+from pathwalker_cli.io.refusals import KeyPath, Lines
+from pathwalker_cli.io.yaml_file import read_mapping, validate
 from pathwalker_cli.paths import shipped
-
-__all__ = [
-    "config_content",
-    "find_config",
-    "load_config",
-    "patient_path",
-    "place_of",
-    "read_config",
-]
 
 Model = TypeVar("Model", bound=BaseModel)
 

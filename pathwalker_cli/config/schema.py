@@ -2,30 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Mapping
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
-from pathwalker_cli.config.nested import merged
 from pathwalker_cli.conventions import ANGLES, STIFFNESSES, Condition
 from pathwalker_cli.errors import did_you_mean
-from pathwalker_cli.gait.costs import COMFORT_COORDINATES, GOALS, Costs
+from pathwalker_cli.gait.costs import GOALS, Costs
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.patient.variation import Variation
 from pathwalker_cli.problems import PROBLEMS
-
-__all__ = [
-    "BoundsConfig",
-    "CostConfig",
-    "MeshConfig",
-    "ModelConfig",
-    "SolverConfig",
-    "StartConfig",
-    "StudyConfig",
-]
 
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
 Seconds = Annotated[float, Quantity("s", 0.005, 2.0, above="is it in milliseconds?")]
@@ -59,12 +48,20 @@ Amount = Annotated[float, Quantity("SI units", -1000.0, 1000.0)]
 AmountRange = Annotated[tuple[Amount, Amount], AS_TUPLE, BeforeValidator(_no_number), ORDERED]
 
 
-def _named(names: Iterable[str], allowed: Collection[str]) -> None:
-    """Refuse a name that there is not."""
-    for name in names:
-        if name not in allowed:
-            known = ", ".join(allowed)
-            raise invalid(f"names '{name}'", allowed=known, mend=did_you_mean(name, allowed))
+def _keys_of(allowed: Collection[str]) -> AfterValidator:
+    """Return what refuses a mapping with other keys than these."""
+
+    def check(value: dict[str, Any]) -> dict[str, Any]:
+        for name in value:
+            if name not in allowed:
+                known = ", ".join(allowed)
+                raise invalid(f"names '{name}'", allowed=known, mend=did_you_mean(name, allowed))
+        return value
+
+    return AfterValidator(check)
+
+
+RangeByAngle = Annotated[dict[str, Range], _keys_of(ANGLES)]
 
 
 def _as_text(value: Any) -> Any:
@@ -89,20 +86,8 @@ class CostConfig(YamlModel):
     fit_weight: Weight = 1.0
     excitation_weight: Weight = 1e-4
     activation_power: Annotated[int, Field(ge=2, le=10)] = 2
-    goals: dict[str, Weight] = Field(default_factory=dict)
-    comfort_ranges: dict[str, Range] = Field(default_factory=dict)
-
-    @field_validator("goals")
-    @classmethod
-    def _goals(cls, value: dict[str, float]) -> dict[str, float]:
-        _named(value, GOALS)
-        return value
-
-    @field_validator("comfort_ranges")
-    @classmethod
-    def _comfort(cls, value: dict[str, Range]) -> dict[str, Range]:
-        _named(value, COMFORT_COORDINATES)
-        return value
+    goals: Annotated[dict[str, Weight], _keys_of(GOALS)] = Field(default_factory=dict)
+    comfort_ranges: RangeByAngle = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _ranges_of_goals(self) -> CostConfig:
@@ -112,6 +97,12 @@ class CostConfig(YamlModel):
                 mend="add comfort_ranges, e.g. {knee_r: [0.0, 0.9]}",
             )
         return self
+
+    @property
+    def weights(self) -> dict[str, float]:
+        """Weight of every cost term by its name."""
+        own = {key.removesuffix("_weight"): value for key, value in self if "_weight" in key}
+        return {**own, **self.goals}
 
     @property
     def wanted(self) -> Costs:
@@ -124,8 +115,8 @@ class BoundsConfig(YamlModel):
     """Bounds of the prediction; they decide the answer as much as the cost does."""
 
     joint_range_margin: Annotated[float, Quantity("rad", 0.0, 1.5, above="is it in degrees?")] = 0.2
-    joint_ranges: dict[str, Range] = Field(default_factory=dict)
-    fallback_joint_ranges: dict[str, Range] = Field(
+    joint_ranges: RangeByAngle = Field(default_factory=dict)
+    fallback_joint_ranges: RangeByAngle = Field(
         default_factory=lambda: {
             "pelvis_tilt": (-0.5, 0.4),
             "hip_r": (-1.25, 0.55),
@@ -140,33 +131,19 @@ class BoundsConfig(YamlModel):
     least_walking_speed: Literal["recorded"] | Speed = "recorded"
     fallback_speed_ratio: Annotated[float, Quantity("", 0.0, 1.0)] = 0.25
     phase_duration: Durations = (0.02, 0.45)
-    phase_durations: dict[str, Durations] = Field(default_factory=dict)
+    phase_durations: Annotated[dict[str, Durations], _keys_of(PHASE_NAMES)] = Field(
+        default_factory=dict
+    )
     distance: Annotated[tuple[Metres, Metres], AS_TUPLE, ORDERED] = (0.3, 3.0)
     joint_speed: Annotated[float, Quantity("rad/s", 1.0, 100.0)] = 30.0
     dorsiflexion_stiffness: StiffnessRange | None = None
     plantarflexion_stiffness: StiffnessRange | None = None
-    stiffness: dict[str, StiffnessRange] = Field(default_factory=dict)
+    stiffness: Annotated[dict[str, StiffnessRange], _keys_of(STIFFNESSES)] = Field(
+        default_factory=dict
+    )
     friction: Annotated[float, Quantity("", 0.05, 2.0)] = 0.8
     least_vertical_force: Annotated[float, Quantity("N", 0.0, 50.0)] = 0.0
     least_height: Annotated[float, Quantity("m", -0.02, 0.0)] = -1e-3
-
-    @field_validator("joint_ranges", "fallback_joint_ranges")
-    @classmethod
-    def _coordinates(cls, value: dict[str, Range]) -> dict[str, Range]:
-        _named(value, ANGLES)
-        return value
-
-    @field_validator("phase_durations")
-    @classmethod
-    def _phases(cls, value: dict[str, Any]) -> dict[str, Any]:
-        _named(value, PHASE_NAMES)
-        return value
-
-    @field_validator("stiffness")
-    @classmethod
-    def _springs(cls, value: dict[str, Any]) -> dict[str, Any]:
-        _named(value, STIFFNESSES)
-        return value
 
 
 class MeshConfig(YamlModel):
@@ -202,15 +179,9 @@ class StartConfig(YamlModel):
     knee_flexion: Annotated[float, Quantity("rad", 0.05, 1.5, above="is it in degrees?")] = 0.7
     stride_ratio: Annotated[float, Quantity("leg lengths", 0.3, 3.0)] = 1.1
     walking_speed: Speed | None = None
-    stiffness: dict[str, Stiffness] = Field(default_factory=dict)
+    stiffness: Annotated[dict[str, Stiffness], _keys_of(STIFFNESSES)] = Field(default_factory=dict)
     free: dict[str, Amount] = Field(default_factory=dict)
     seed: Annotated[int, Field(ge=0)] = 0
-
-    @field_validator("stiffness")
-    @classmethod
-    def _stiffnesses(cls, value: dict[str, float]) -> dict[str, float]:
-        _named(value, STIFFNESSES)
-        return value
 
 
 class SolverConfig(YamlModel):
@@ -252,8 +223,7 @@ class StudyConfig(YamlModel):
         problem = value.get("problem") if isinstance(value, dict) else None
         if not isinstance(problem, str) or problem not in PROBLEMS:
             return value
-        defaults = PROBLEMS[problem].defaults
-        return merged(defaults, value)
+        return merged(PROBLEMS[problem].defaults, value)
 
     @field_validator("problem")
     @classmethod
@@ -303,3 +273,15 @@ class StudyConfig(YamlModel):
     def fits(self) -> bool:
         """Whether a recording is followed, equation (8), instead of a gait predicted."""
         return PROBLEMS[self.problem].goal == "fit"
+
+
+def merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Return two nested mappings as one; where both have a value, `over` counts."""
+    result = dict(under)
+    for key, value in over.items():
+        below = result.get(key)
+        if isinstance(below, Mapping) and isinstance(value, Mapping):
+            result[key] = merged(below, value)
+        else:
+            result[key] = value
+    return result

@@ -1,16 +1,66 @@
-"""Values of study configs by dotted key: what is not a default, and what differs between runs."""
+"""Values of study configs by dotted key: put in from outside, not the default, or differing."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from pathwalker_cli.config.schema import StudyConfig
-
-__all__ = ["NO_VALUE", "changed_values", "differing_values", "value_text"]
+from pathwalker_cli.config.schema import StudyConfig, merged
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.io.refusals import KeyPath
+from pathwalker_cli.io.yaml_file import read_value, validate
+from pathwalker_cli.model.contact import PHASE_NAMES
 
 NO_VALUE: Final = "-"
 """Stands for the value of a key that a config does not have, such as one of a mapping."""
+
+
+def apply_change(mapping: dict[str, Any], change: str) -> KeyPath:
+    """Put one override "a.b=value" into a mapping; the value is read as YAML.
+
+    Returns:
+        The key that was overridden.
+
+    Raises:
+        ConfigError: If it is no override, or there is no such place.
+    """
+    key, equals, text = change.partition("=")
+    if not equals or not key.strip():
+        raise ConfigError(f"'{change}' is no override", where="--set", allowed="dotted.key=value")
+    value = read_value(text, f"--set {change}")
+    inner, last = _holder(mapping, key.strip(), f"--set {change}")
+    inner[last] = value
+    return tuple(key.strip().split("."))
+
+
+def with_values(config: StudyConfig, values: Mapping[str, Any], where: str = "") -> StudyConfig:
+    """Return a config with some values replaced and validated anew.
+
+    Args:
+        config: The config.
+        values: New values by dotted key, e.g. {"cost.walking_speed_weight": 1.0}.  A mapping at a
+            section, e.g. {"mesh": {...}}, replaces only what it names; one below a section, e.g.
+            {"variation.scale": {...}}, takes the place of what was there.
+        where: Origin of the values, for the message.
+
+    Raises:
+        ConfigError: If a key does not exist or a value is refused.
+    """
+    content: dict[str, Any] = config.model_dump(mode="json")
+    for key, value in values.items():
+        inner, last = _holder(content, key, f"{where}, {key}")
+        whole = last == key and isinstance(value, Mapping) and isinstance(inner.get(last), dict)
+        inner[last] = merged(inner[last], value) if whole else value
+    return validate(content, StudyConfig, where=where or "overrides", error=ConfigError)
+
+
+def smoke_version(config: StudyConfig) -> StudyConfig:
+    """Return a config with a short horizon for quick checks: coarse mesh, no refinement."""
+    mesh = config.mesh.model_copy(update={"intervals": (2,) * len(PHASE_NAMES), "refinements": 0})
+    loose = {"max_iterations": min(400, config.solver.max_iterations), "tolerance": 1e-3}
+    solver = config.solver.model_copy(update=loose)
+    changes = {"mesh": mesh, "solver": solver, "smoke": True, "verdict": False}
+    return config.model_copy(update=changes)
 
 
 def changed_values(config: StudyConfig) -> dict[str, tuple[Any, Any]]:
@@ -28,8 +78,8 @@ def differing_values(configs: Sequence[StudyConfig]) -> dict[str, tuple[str, ...
     """Return the keys whose values are not the same in all configs, with all values as text."""
     flat = [_flat(config) for config in configs]
     keys = dict.fromkeys(key for values in flat for key in values)
-    found = {key: tuple(value_text(values.get(key, NO_VALUE)) for values in flat) for key in keys}
-    return {key: values for key, values in found.items() if len(set(values)) > 1}
+    texts = {key: tuple(value_text(values.get(key, NO_VALUE)) for values in flat) for key in keys}
+    return {key: values for key, values in texts.items() if len(set(values)) > 1}
 
 
 def value_text(value: Any) -> str:
@@ -50,3 +100,22 @@ def _entries(prefix: str, content: Mapping[str, Any]) -> Iterator[tuple[str, Any
             yield from _entries(f"{prefix}{key}.", value)
         else:
             yield f"{prefix}{key}", value
+
+
+def _holder(mapping: dict[str, Any], key: str, where: str) -> tuple[dict[str, Any], str]:
+    """Return the mapping that holds a dotted key, and the last part of the key.
+
+    Args:
+        mapping: The outermost mapping; what lacks on the way is put into it.
+        key: The key, e.g. "mesh.degree".
+        where: Origin of the key, for the message.
+
+    Raises:
+        ConfigError: If there is a value on the way that holds no keys.
+    """
+    *parents, last = key.split(".")
+    for parent in parents:
+        mapping = mapping.setdefault(parent, {})
+        if not isinstance(mapping, dict):
+            raise ConfigError(f"'{parent}' holds no keys", where=where)
+    return mapping, last

@@ -36,20 +36,6 @@ from pathwalker_cli.stride.figures.style import (
 from pathwalker_cli.stride.measures import ankle_line
 from pathwalker_cli.stride.stride import POINTS, NotKnownError, Stride
 
-__all__ = [
-    "ACTIVATIONS",
-    "ANGLES",
-    "FORCES",
-    "MOMENTS",
-    "CycleCurve",
-    "Trace",
-    "draw_ankle",
-    "draw_cycle",
-    "dress_cycle",
-    "known_curves",
-    "traces",
-]
-
 FINE: Final = 301
 """Points of computed curves, which are smooth; recorded ones have `POINTS`."""
 

@@ -24,18 +24,6 @@ from pathwalker_cli.evaluation.recorded import (
 from pathwalker_cli.stride.measure import CYCLE, FORCE, TRIAL, Measure
 from pathwalker_cli.stride.stride import POINTS, Part, Stride
 
-__all__ = [
-    "DIFFERENCES",
-    "FORCE_RMS",
-    "JOINTS",
-    "force_rms",
-    "recorded_force_rms",
-    "recorded_rms_mean_cycle",
-    "recorded_rms_one_trial",
-    "rms_mean_cycle",
-    "rms_one_trial",
-]
-
 JOINTS: Final = {
     "pelvis": ("pelvis_tilt",),
     "hip": ("hip_r", "hip_l"),

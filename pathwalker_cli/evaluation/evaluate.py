@@ -35,8 +35,6 @@ from pathwalker_cli.stride.measure import SECTIONS, Measure
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.stride.stride import Stride
 
-__all__ = ["Change", "Evaluation", "Row", "compared", "evaluate_gait", "gait_changes"]
-
 
 @dataclass(frozen=True)
 class Row:

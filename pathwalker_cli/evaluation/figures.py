@@ -34,16 +34,6 @@ from pathwalker_cli.stride.figures.style import (
     new_figure,
 )
 
-__all__ = [
-    "ankle_figure",
-    "ankle_pair",
-    "cycle_figure",
-    "cycle_pairs",
-    "legend_handles",
-    "save_evaluation_figures",
-    "save_overlays",
-]
-
 PAIR_HEIGHT: Final = 1.15
 """Height of a row of two panels in a column [in]."""
 ANKLE_HEIGHT: Final = 2.0 * PAIR_HEIGHT

@@ -17,18 +17,6 @@ import numpy as np
 
 from pathwalker_cli.conventions import Condition
 
-__all__ = [
-    "CLAIMS",
-    "NUMBERS",
-    "PATIENT",
-    "REFERENCE_STRIDES",
-    "PaperClaim",
-    "PaperNumber",
-    "ReferenceRows",
-    "paper_claim",
-    "paper_number",
-]
-
 PATIENT: Final = "sreenivasa2017-patient"
 """Id of the patient whom the article is about."""
 

@@ -23,18 +23,6 @@ from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.stride.stride import POINTS, Part, Stride
 
-__all__ = [
-    "Position",
-    "RecordedGait",
-    "Spread",
-    "article_stride",
-    "left_toe_off_stride",
-    "recorded_gait",
-    "recorded_numbers",
-    "reference_stride",
-    "spread",
-]
-
 Position = Literal["below", "in", "above"]
 """Where a value lies in relation to a recorded range."""
 

@@ -12,15 +12,6 @@ from pathwalker_cli.results.run_folder import Run, load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import Stride, stride_of
 
-__all__ = [
-    "gait_of_run",
-    "gaits_of_runs",
-    "run_and_gait",
-    "run_names",
-    "run_notes",
-    "stride_of_run",
-]
-
 
 def gaits_of_runs(folders: Sequence[Path]) -> tuple[tuple[Run, Stride], ...]:
     """Return several runs with their gaits under names that differ.

@@ -13,15 +13,6 @@ from pathwalker_cli.evaluation.recorded import Spread
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.stride.measure import Measure
 
-__all__ = [
-    "change_lines",
-    "evaluation_content",
-    "evaluation_lines",
-    "evaluation_notes",
-    "spread_text",
-    "write_csv",
-]
-
 _LITERATURE: Final = 2.0
 """Peak vertical force over that of healthy walking in earlier predictions, article, section 1."""
 

@@ -12,8 +12,6 @@ from pathwalker_cli.conventions import mirror_permutation
 from pathwalker_cli.gait.costs import Costs, Totals
 from pathwalker_cli.ocp.problem import INFINITY, Boundary, Instant, Rows, Variables
 
-__all__ = ["gait_boundary"]
-
 Groups = tuple[Variables, Variables, Variables]
 
 
@@ -29,7 +27,7 @@ def gait_boundary(
     """Return boundary rows and objective of a gait.
 
     Args:
-        groups: States (pelvis_tx first), activations and their rates.
+        groups: States, activations and their rates.
         parameters: Free parameters; of a mirrored gait left and right are equal.
         costs: The cost terms.
         weights: Weight of every one by name.
@@ -42,15 +40,11 @@ def gait_boundary(
     durations = ca.SX.sym("durations", phases)
     totals = ca.SX.sym("integrals", len(costs.integrals))
     steps = 2 if mirrored else 1  # distance, time and costs are those of a whole stride
-    distance = steps * (last[0][0] - first[0][0])
+    x = groups[0].names.index("pelvis_tx")
+    distance = steps * (last[0][x] - first[0][x])
     time = steps * ca.sum1(durations)
-    free = Rows.make(
-        ca.vertcat(distance, distance / time),
-        ("distance", "walking_speed"),
-        1.0,
-        -INFINITY,
-        INFINITY,
-    )
+    speed, names = ca.vertcat(distance, distance / time), ("distance", "walking_speed")
+    free = Rows.make(speed, names, 1.0, -INFINITY, INFINITY)
     if start is None:
         ends = _periodicity(groups, first, last, mirrored)
     else:
@@ -86,8 +80,9 @@ def _at_first(rows: Rows, states: Variables, first: ca.SX) -> Rows:
 def _periodicity(groups: Groups, first: Instant, last: Instant, mirrored: bool) -> list[Rows]:
     """Return the rows that let the last instant be the first one, left and right exchanged."""
     result = []
-    for a, b, group, skip in zip(first, last, groups, (1, 0, 0), strict=True):
+    for a, b, group in zip(first, last, groups, strict=True):
         order = mirror_permutation(group.names) if mirrored else np.arange(group.size)
-        names = tuple(f"{name} periodicity" for name in group.names[skip:])
-        result.append(Rows.make((b - a[order.tolist()])[skip:], names, group.scale[skip:]))
+        kept = [i for i, name in enumerate(group.names) if name != "pelvis_tx"]
+        names = tuple(f"{group.names[i]} periodicity" for i in kept)
+        result.append(Rows.make((b - a[order.tolist()])[kept], names, group.scale[kept]))
     return result

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from pathwalker_cli.config import BoundsConfig, StudyConfig
-from pathwalker_cli.conventions import ANGLES, GRAVITY, ROOT
+from pathwalker_cli.conventions import ANGLES, COORDINATES, GRAVITY, ROOT
 from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.problem import ACTIVATIONS, RESERVES, VELOCITIES
 from pathwalker_cli.io.fields import quantity_at
 from pathwalker_cli.model.contact import FORCES, PHASES, POINTS
@@ -20,9 +21,9 @@ from pathwalker_cli.ocp.problem import INFINITY, BoundTable
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import orthosis_fault
 
-__all__ = ["GaitBounds", "gait_bounds", "held", "recorded_durations", "tracking_bounds"]
-
 Range = tuple[float, float]
+Entries = dict[tuple[str, ...], Range]
+ANYTHING: Final[Range] = (-INFINITY, INFINITY)
 
 
 @dataclass(frozen=True)
@@ -59,25 +60,26 @@ def gait_bounds(
         ConfigError: If a joint has no range, or an orthosis within the ranges could not be.
     """
     sources: dict[str, str] = {}
-    entries: dict[tuple[str, ...], Range] = _always()
+    entries: Entries = {
+        ("pelvis_tx", "first"): (0.0, 0.0),
+        ("pelvis_tz",): (0.0, choices.HIGHEST_PELVIS),
+    }
+    entries |= _each(ACTIVATIONS, (0.0, 1.0))
     entries |= _joint_ranges(walker, config, sources)
-    for name in VELOCITIES:
-        entries[(name,)] = (-config.joint_speed, config.joint_speed)
+    entries |= _each(VELOCITIES, (-config.joint_speed, config.joint_speed))
     for phase in PHASES:
         pair = config.phase_durations.get(phase.name, config.phase_duration)
         entries[("duration", phase.name)] = pair
         sources[f"duration of {phase.name}"] = f"[{pair[0]:g}, {pair[1]:g}] s, from the config"
-    for force in FORCES:
-        if force.bears:
-            entries[(force.name,)] = (config.least_vertical_force, INFINITY)
-    for point in POINTS:
-        entries[(f"{point.name} height",)] = (config.least_height, INFINITY)
+    loads = (force.name for force in FORCES if force.bears)
+    entries |= _each(loads, (config.least_vertical_force, INFINITY))
+    entries |= _each((f"{p.name} height" for p in POINTS), (config.least_height, INFINITY))
     entries |= _lift_off()
     entries[("distance",)] = config.distance
     entries[("walking_speed",)] = (_least_speed(walker, config, sources), INFINITY)
     ranges, keys = _unknowns(walker, config, free, sources)
     entries |= {(name,): pair for name, pair in ranges.items()}
-    entries |= {(name,): (0.0, 0.0) for name in RESERVES}
+    entries |= _each(RESERVES, (0.0, 0.0))
     return GaitBounds(BoundTable(entries), sources, ranges, keys)
 
 
@@ -99,14 +101,10 @@ def tracking_bounds(
         durations: Phase durations [s], shape (8,).
         held: Value of every unknown of the walker by name [SI].
     """
-    changes: dict[tuple[str, ...], Range] = {(name,): (-INFINITY, INFINITY) for name in RESERVES}
-    changes |= {(name,): (-2.5, 2.5) for name in ANGLES}
-    changes[("walking_speed",)] = (-INFINITY, INFINITY)
-    for phase, duration in zip(PHASES, durations, strict=True):
-        changes[("duration", phase.name)] = (float(duration), float(duration))
-    for name, value in held.items():
-        changes[(name,)] = (float(value), float(value))
-    return bounds.table.replace(changes)
+    changes = _each((*RESERVES, "walking_speed"), ANYTHING)
+    changes |= _each(ANGLES, choices.TRACKING_ANGLES)
+    changes |= {(name,): (value, value) for name, value in held.items()}
+    return recorded_durations(bounds, durations).table.replace(changes)
 
 
 def helped_bounds(bounds: GaitBounds) -> BoundTable:
@@ -114,9 +112,8 @@ def helped_bounds(bounds: GaitBounds) -> BoundTable:
 
     The pelvis gets none: nobody carries the patient.
     """
-    free: dict[tuple[str, ...], Range]
-    free = {(name,): (-INFINITY, INFINITY) for name in RESERVES[len(ROOT) :]}
-    return bounds.table.replace(free)
+    helping = (name for name in COORDINATES if name not in ROOT)
+    return bounds.table.replace(_each((f"{name}_reserve" for name in helping), ANYTHING))
 
 
 def held(config: StudyConfig, values: Mapping[Unknown, float]) -> dict[str, Any]:
@@ -139,15 +136,12 @@ def held(config: StudyConfig, values: Mapping[Unknown, float]) -> dict[str, Any]
     return {"free": free, "bounds.stiffness": springs}
 
 
-def _always() -> dict[tuple[str, ...], Range]:
-    """Return bounds that are no choice: where the walk starts, what can not be negative."""
-    entries: dict[tuple[str, ...], Range] = {("pelvis_tx", "first"): (0.0, 0.0)}
-    entries[("pelvis_tz",)] = (0.0, 2.0)
-    entries |= {(name,): (0.0, 1.0) for name in ACTIVATIONS}
-    return entries
+def _each(names: Iterable[str], pair: Range) -> Entries:
+    """Return the same bounds for several quantities."""
+    return {(name,): pair for name in names}
 
 
-def _lift_off() -> dict[tuple[str, ...], Range]:
+def _lift_off() -> Entries:
     """Return zero force at the last instant before a point leaves the ground."""
     following = PHASES[1:] + PHASES[:1]
     return {
@@ -157,12 +151,9 @@ def _lift_off() -> dict[tuple[str, ...], Range]:
     }
 
 
-def _joint_ranges(
-    walker: Walker, config: BoundsConfig, sources: dict[str, str]
-) -> dict[tuple[str, ...], Range]:
-    recorded = walker.patient.recorded.get("barefoot")
-    margin = config.joint_range_margin
-    entries: dict[tuple[str, ...], Range] = {}
+def _joint_ranges(walker: Walker, config: BoundsConfig, sources: dict[str, str]) -> Entries:
+    recorded, margin = walker.patient.recorded.get("barefoot"), config.joint_range_margin
+    entries: Entries = {}
     for name in walker.skeleton.angles:
         if name in config.joint_ranges:
             low, high = config.joint_ranges[name]
@@ -246,26 +237,14 @@ def _spring_range(walker: Walker, config: BoundsConfig, unknown: Unknown) -> tup
 
 
 def _check_orthosis(walker: Walker, ranges: Mapping[str, Range], keys: Mapping[str, str]) -> None:
-    """Refuse ranges within which an orthosis has no exact torque curve.
-
-    Raises:
-        ConfigError: If stops, free play and springs of the ranges do not fit everywhere.
-    """
-    if not walker.device.worn:
-        return
-    chosen = {a: u for u in walker.unknowns for a in u.addresses}
+    """Refuse ranges of stops, free play and springs with which a torque curve is not exact."""
+    chosen = {address: u.name for u in walker.unknowns for address in u.addresses}
     for element in walker.device.elements.values():
-        values = {
-            number.name: ranges[chosen[number.address].name]
-            if number.address in chosen
-            else (walker.values[number.address],) * 2
-            for number in element.numbers
-        }
+        free = {n.name: chosen[n.address] for n in element.numbers if n.address in chosen}
+        fixed = {n.name: (walker.values[n.address],) * 2 for n in element.numbers}
+        values = {**fixed, **{name: ranges[unknown] for name, unknown in free.items()}}
         fault = orthosis_fault(values, element.side)
         if fault is not None:
-            free = {
-                n.name: keys[chosen[n.address].name] for n in element.numbers if n.address in chosen
-            }
-            where = next((free[name] for name in fault.numbers if name in free), "orthosis")
+            where = next((keys[free[name]] for name in fault.numbers if name in free), "orthosis")
             what = f"is {fault.what}" if fault.spring else f"leaves room for {fault.what}"
             raise ConfigError(what, where=where, allowed=fault.allowed)

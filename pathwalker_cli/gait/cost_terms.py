@@ -13,8 +13,6 @@ from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 from pathwalker_cli.ocp.problem import Sample
 
-__all__ = ["cost_terms", "goal_values", "prediction_terms", "walked_distance", "with_goal_costs"]
-
 
 def cost_terms(
     motion: PhasedMotion, costs: Costs, weights: Weights, samples: tuple[Sample, ...] = ()
@@ -31,7 +29,7 @@ def cost_terms(
     terms = prediction_terms(motion, totals, costs, weights)
     if samples:
         last = terms.pop("excitation_regularisation")
-        terms["fit"] = weights["fit"] * squared_distance(motion, samples)
+        terms["fit"] = weights["fit"] * _squared_distance(motion, samples)
         terms["excitation_regularisation"] = last
     return terms
 
@@ -41,11 +39,7 @@ def prediction_terms(
 ) -> dict[str, float]:
     """Return the weighed terms by name, but for that of recorded instants.
 
-    Args:
-        motion: A whole stride.
-        integrals: Integrals of the running costs over it by name, without weights.
-        costs: The terms.
-        weights: Their weights.
+    `integrals` are those of the running costs over a whole stride by name, without weights.
     """
     return costs.values(weights, _totals(motion, integrals))
 
@@ -57,7 +51,7 @@ def goal_values(
 
     Args:
         motion: A whole stride.
-        weight: Body weight with what is worn [N].
+        weight: Body weight, orthosis included [N].
         comfort_ranges: Comfortable range by coordinate [rad].
     """
     names = tuple(name for name in GOALS if name != "discomfort" or comfort_ranges)
@@ -69,12 +63,9 @@ def goal_values(
 
 
 def with_goal_costs(motion: PhasedMotion, costs: Costs, weight: float) -> PhasedMotion:
-    """Return a motion whose integrals are those of a problem with these goals.
+    """Return a motion, of a problem with any goals, whose integrals are those of these goals.
 
-    Args:
-        motion: A motion of a problem with these or other goals.
-        costs: The terms of a prediction.
-        weight: Body weight with what is worn [N].
+    `weight` is that of the body, orthosis included [N].
     """
     base = sum(len(term.integrals) for term in BASE.values())
     phases, reached = [], np.zeros(len(costs.integrals) - base)
@@ -87,16 +78,15 @@ def with_goal_costs(motion: PhasedMotion, costs: Costs, weight: float) -> Phased
 
 def walked_distance(motion: PhasedMotion) -> float:
     """Return how far the pelvis gets in a motion of a gait problem [m]."""
-    return float(motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0])
+    x = COORDINATES.index("pelvis_tx")
+    return float(motion.phases[-1].states[-1, x] - motion.phases[0].states[0, x])
 
 
-def squared_distance(motion: PhasedMotion, samples: tuple[Sample, ...]) -> float:
+def _squared_distance(motion: PhasedMotion, samples: tuple[Sample, ...]) -> float:
     """Return the sum over instants and coordinates of (q - q_recorded)^2 [rad^2 and m^2]."""
-    total = 0.0
-    for sample in samples:
-        state = motion.phases[sample.phase].states_at(np.array([sample.fraction]))[0]
-        total += float(np.sum((state[: len(COORDINATES)] - sample.data) ** 2))
-    return total
+    states = (motion.phases[s.phase].states_at(np.array([s.fraction]))[0] for s in samples)
+    q = (state[: len(COORDINATES)] for state in states)
+    return sum(float(np.sum((a - s.data) ** 2)) for a, s in zip(q, samples, strict=True))
 
 
 def _totals(motion: PhasedMotion, integrals: Mapping[str, float]) -> Totals:
@@ -109,8 +99,8 @@ def _goal_gains(phase: PhaseMotion, costs: Costs, weight: float) -> np.ndarray:
     contact, n = phase_named(phase.name), len(COORDINATES)
     shape = phase.inner_states.shape[:2]
     activation = phase.smooth_at(phase.point_fractions.ravel()).reshape(*shape, -1)
-    force = phase.algebraic[..., n : n + len(contact.indices)]
-    columns = phase.inner_states[..., :n], phase.inner_states[..., n:], activation, force
+    q, v = np.split(phase.inner_states, 2, axis=-1)
+    columns = q, v, activation, phase.algebraic[..., n : n + len(contact.forces)]
     point = Instant(contact, *(list(np.moveaxis(values, -1, 0)) for values in columns))
     running = costs.integrands(point, list(costs.numbers(weight)), costs.goals)
     values = np.array([np.broadcast_to(cost, shape) for cost in running])

@@ -13,29 +13,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, SUFFIX
+from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, LEG_JOINTS, SUFFIX
+from pathwalker_cli.gait import choices
 from pathwalker_cli.model.contact import PHASES, ContactPhase
-
-__all__ = ["BASE", "COMFORT_COORDINATES", "GOALS", "CostTerm", "Costs", "Instant", "Totals"]
 
 Weights = Mapping[str, float]
 """Weight of every term by its name; what is missing counts nothing."""
-
-COMFORT_COORDINATES: Final = ANGLES
-"""Coordinates that may have a comfortable range: all but the position of the pelvis."""
-
-RATE_SIZE, ACCELERATION_SIZE, FORCE_SIZE = 20.0, 50.0, 20.0
-"""What counts as 1: an activation rate [1/s], an acceleration [m/s^2, rad/s^2], a reserve force or
-residual [N, N m]; with these the prototypes needed the fewest iterations."""
-
-_PEAK_POWER: Final = 8
-"""Power of the mean that stands for the largest activation."""
-_PEAK_FLOOR: Final = 1e-6
-"""Keeps the derivative of the root finite where no muscle is active: a peak of 0.18."""
-_COMFORT_ROUNDING: Final = 0.01
-"""Half width to which the edge of a comfortable range is rounded off [rad]."""
-_UNBOUNDED: Final = 10.0
-"""Edge of a comfortable range that is not given [rad]."""
 
 
 @dataclass(frozen=True)
@@ -135,8 +118,9 @@ class CostTerm:
     result: str = ""
 
 
-def _squares(values: Sequence[Any], scale: float = 1.0) -> Any:
-    return sum((value / scale) ** 2 for value in values)
+def _squares(name: str, size: float = 1.0) -> Callable[[Instant], tuple[Any, ...]]:
+    """Return the sum of squares of what an instant holds under a name as a running cost."""
+    return lambda point: (sum((value / size) ** 2 for value in getattr(point, name)),)
 
 
 def _of(name: str) -> Callable[[Totals], Any]:
@@ -152,24 +136,8 @@ def _effort(point: Instant) -> tuple[Any, ...]:
     return (sum(a**point.power for a in point.activation),)
 
 
-def _rates(point: Instant) -> tuple[Any, ...]:
-    return (_squares(point.rate, RATE_SIZE),)
-
-
-def _accelerations(point: Instant) -> tuple[Any, ...]:
-    return (_squares(point.vdot, ACCELERATION_SIZE),)
-
-
 def _distance_from_reference(point: Instant) -> tuple[Any, ...]:
-    return (_squares([a - b for a, b in zip(point.q, point.reference, strict=True)]),)
-
-
-def _reserves(point: Instant) -> tuple[Any, ...]:
-    return (_squares(point.reserve, FORCE_SIZE),)
-
-
-def _excitations(point: Instant) -> tuple[Any, ...]:
-    return (_squares(point.excitation),)
+    return (sum((a - b) ** 2 for a, b in zip(point.q, point.reference, strict=True)),)
 
 
 BASE: Final[dict[str, CostTerm]] = {
@@ -179,12 +147,13 @@ BASE: Final[dict[str, CostTerm]] = {
     ),
     "rate": CostTerm(
         "calm controls: squared activation rates per distance (regularisation)",
-        ("rate",), _rates, _of("rate"), "s/m", per_distance=True, result="rate_regularisation",
+        ("rate",), _squares("rate", choices.RATE_SIZE), _of("rate"), "s/m", per_distance=True,
+        result="rate_regularisation",
     ),
     "acceleration": CostTerm(
         "calm limbs: squared accelerations per distance (regularisation)",
-        ("acceleration",), _accelerations, _of("acceleration"), "s/m", per_distance=True,
-        result="acceleration_regularisation",
+        ("acceleration",), _squares("vdot", choices.ACCELERATION_SIZE), _of("acceleration"), "s/m",
+        per_distance=True, result="acceleration_regularisation",
     ),
     "tracking": CostTerm(
         "follow a stride: integral of (q - q_ref)^2",
@@ -192,7 +161,7 @@ BASE: Final[dict[str, CostTerm]] = {
     ),
     "reserve": CostTerm(
         "no help from outside: integral of the squared reserve forces",
-        ("reserve",), _reserves, _of("reserve"), "s",
+        ("reserve",), _squares("reserve", choices.FORCE_SIZE), _of("reserve"), "s",
     ),
     "smoothing": CostTerm(
         "calm muscles: integrals of squared activations and rates, not per distance",
@@ -207,7 +176,8 @@ BASE: Final[dict[str, CostTerm]] = {
 
 EXCITATION: Final = CostTerm(
     "little excitation: integral of the squared excitations, equation (8)",
-    ("excitation",), _excitations, _of("excitation"), "s", result="excitation_regularisation",
+    ("excitation",), _squares("excitation"), _of("excitation"), "s",
+    result="excitation_regularisation",
 )  # fmt: skip
 """A further term of a passage that follows a recording; the other one, "fit", is the weight of the
 sum over recorded instants of (q - q_recorded)^2."""
@@ -218,9 +188,9 @@ def _crouch(point: Instant) -> tuple[Any, ...]:
 
 
 def _asymmetry(point: Instant) -> tuple[Any, ...]:
-    advance = point.v[0] if point.first_step else 0.0 * point.v[0]
-    joints = ("hip", "knee", "ankle")
-    return advance, *(point.angle(f"{j}_r") - point.angle(f"{j}_l") for j in joints)
+    speed = point.v[COORDINATES.index("pelvis_tx")]
+    advance = speed if point.first_step else 0.0 * speed
+    return advance, *(point.angle(f"{j}_r") - point.angle(f"{j}_l") for j in LEG_JOINTS)
 
 
 def _asymmetry_value(total: Totals) -> Any:
@@ -239,16 +209,17 @@ def _pressure(point: Instant) -> tuple[Any, ...]:
 
 
 def _peak(point: Instant) -> tuple[Any, ...]:
-    return (sum(a**_PEAK_POWER for a in point.activation),)
+    return (sum(a**choices.PEAK_POWER for a in point.activation),)
 
 
 def _peak_value(total: Totals) -> Any:
-    return (total.integrals["peak_activation"] / total.time + _PEAK_FLOOR) ** (1.0 / _PEAK_POWER)
+    mean = total.integrals["peak_activation"] / total.time
+    return (mean + choices.PEAK_FLOOR) ** (1.0 / choices.PEAK_POWER)
 
 
 def _discomfort(point: Instant) -> tuple[Any, ...]:
-    count, cost = len(COMFORT_COORDINATES), 0.0
-    for i, name in enumerate(COMFORT_COORDINATES):
+    count, cost = len(ANGLES), 0.0
+    for i, name in enumerate(ANGLES):
         angle, lower, upper = point.angle(name), point.data[i], point.data[count + i]
         cost = cost + _beyond(angle - upper) ** 2 + _beyond(lower - angle) ** 2
     return (cost,)
@@ -256,7 +227,7 @@ def _discomfort(point: Instant) -> tuple[Any, ...]:
 
 def _beyond(x: Any) -> Any:
     """Return x where it is positive and 0 elsewhere, rounded off."""
-    return 0.5 * (x + (x * x + _COMFORT_ROUNDING**2) ** 0.5)
+    return 0.5 * (x + (x * x + choices.COMFORT_ROUNDING**2) ** 0.5)
 
 
 def _mean(name: str) -> Callable[[Totals], Any]:
@@ -267,44 +238,27 @@ def _mean(name: str) -> Callable[[Totals], Any]:
 GOALS: Final[dict[str, CostTerm]] = {
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",
-        ("crouch",),
-        _crouch,
-        _mean("crouch"),
-        "rad^2",
+        ("crouch",), _crouch, _mean("crouch"), "rad^2",
     ),
     "asymmetry": CostTerm(
         "equal left and right: steps, times of phases, mean hip, knee and ankle angles",
         ("first_advance", "hip_difference", "knee_difference", "ankle_difference"),
-        _asymmetry,
-        _asymmetry_value,
-        "1",
-        whole_stride=True,
+        _asymmetry, _asymmetry_value, "1", whole_stride=True,
     ),
     "centre_of_pressure": CostTerm(
         "less movement of the centre of pressure: mean square of its distance from the middle of "
         "the foot in half foot lengths, times the load of the foot in body weights",
-        ("centre_of_pressure",),
-        _pressure,
-        _mean("centre_of_pressure"),
-        "1",
-        size=1,
+        ("centre_of_pressure",), _pressure, _mean("centre_of_pressure"), "1", size=1,
     ),
     "peak_activation": CostTerm(
         "spare the muscle that works hardest: 8th root of the mean 8th power of all activations",
-        ("peak_activation",),
-        _peak,
-        _peak_value,
-        "1",
+        ("peak_activation",), _peak, _peak_value, "1",
     ),
     "discomfort": CostTerm(
         "stay in comfortable joint ranges: mean square of how far angles are outside them",
-        ("discomfort",),
-        _discomfort,
-        _mean("discomfort"),
-        "rad^2",
-        size=2 * len(COMFORT_COORDINATES),
+        ("discomfort",), _discomfort, _mean("discomfort"), "rad^2", size=2 * len(ANGLES),
     ),
-}
+}  # fmt: skip
 """All goals by the name that configs and results use."""
 
 
@@ -356,30 +310,19 @@ class Costs:
         return sum(term.size for term in self.terms.values())
 
     def numbers(self, weight: float) -> np.ndarray:
-        """Return the numbers of all terms, shape (size,).
-
-        Args:
-            weight: Body weight with what is worn [N].
-        """
-        ranges = [
-            self.comfort_ranges.get(name, (-_UNBOUNDED, _UNBOUNDED)) for name in COMFORT_COORDINATES
-        ]
-        known = {
-            "centre_of_pressure": np.array([weight]),
-            "discomfort": np.array(ranges).T.ravel(),
-        }
+        """Return the numbers of all terms for a body weight, orthosis included [N], (size,)."""
+        wide = (-choices.NO_EDGE, choices.NO_EDGE)
+        ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
+        known = {"centre_of_pressure": [weight], "discomfort": np.array(ranges).T.ravel()}
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])
 
     def integrands(
-        self,
-        point: Instant,
-        numbers: Sequence[Any],
-        terms: Mapping[str, CostTerm] | None = None,
+        self, point: Instant, numbers: Sequence[Any], terms: Mapping[str, CostTerm] | None = None
     ) -> list[Any]:
-        """Return the running costs at an instant.
+        """Return the running costs at an instant, whose power and data are filled in here.
 
         Args:
-            point: The instant; power and data are filled in here.
+            point: The instant.
             numbers: What `numbers` returns, or symbols for it.
             terms: The terms, if not all.
         """
@@ -400,14 +343,15 @@ class Costs:
 
     def values(self, weights: Weights, total: Totals) -> dict[str, float]:
         """Return the weighed terms by the names that results give them."""
-        values = {}
-        for name, term in self.terms.items():
-            value = weights.get(name, 0.0) * term.value(total)
-            if name in GOALS or term.result:
-                values[term.result or name] = float(
-                    value / total.distance if term.per_distance else value
-                )
-        return values
+        return {
+            term.result or name: float(
+                weights.get(name, 0.0)
+                * term.value(total)
+                / (total.distance if term.per_distance else 1.0)
+            )
+            for name, term in self.terms.items()
+            if name in GOALS or term.result
+        }
 
     def goal_values(self, total: Totals) -> dict[str, Any]:
         """Return the goals without weights by name."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pathwalker_cli.config import MeshConfig
+from pathwalker_cli.gait import choices
 from pathwalker_cli.stride.verify import Reintegration
-
-__all__ = ["by_duration", "first", "refined", "uniform"]
 
 
 def uniform(counts: np.ndarray | list[int]) -> tuple[np.ndarray, ...]:
@@ -25,41 +24,32 @@ def first(durations: np.ndarray, config: MeshConfig) -> tuple[np.ndarray, ...]:
 def by_duration(
     durations: np.ndarray, intervals: int, least_per_phase: int
 ) -> tuple[np.ndarray, ...]:
-    """Return a mesh of about equally long intervals.
+    """Return a mesh of so many, about equally long intervals for phases of these durations [s].
 
-    Args:
-        durations: Phase durations [s].
-        intervals: Number of intervals over all phases; short phases may bring in a few more.
-        least_per_phase: Fewest intervals in a phase.
+    Short phases, which get the fewest that are allowed, may bring in a few more.
     """
     shares = intervals * np.asarray(durations) / np.sum(durations)
     return uniform(np.maximum(np.ceil(shares), least_per_phase).astype(int).tolist())
 
 
 def refined(
-    meshes: tuple[np.ndarray, ...],
-    errors: Reintegration,
-    position_tolerance: float,
-    velocity_tolerance: float,
-    order: int,
-    share: float = 1.0,
+    meshes: tuple[np.ndarray, ...], errors: Reintegration, config: MeshConfig, share: float = 1.0
 ) -> tuple[np.ndarray, ...]:
     """Return a mesh in which intervals that miss the tolerances are split.
 
     Args:
         meshes: The mesh that was used.
         errors: Errors on it.
-        position_tolerance: Error of q to stay below [rad, m].
-        velocity_tolerance: Error of v to stay below [rad/s, m/s].
-        order: Order of the error in the length of an interval.
+        config: Tolerances; its degree is the order of the error in the length of an interval.
         share: Share of the tolerances above which an interval is split.
     """
     result = []
     for mesh, position, velocity in zip(meshes, errors.position, errors.velocity, strict=True):
-        ratio = np.maximum(position / position_tolerance, velocity / velocity_tolerance)
-        # half the tolerance is aimed at: the next solution moves a little
-        parts = np.ceil(np.clip(2.0 * ratio, 1e-9, 1e6) ** (1.0 / order))
-        parts = np.where(ratio > share, np.clip(parts, 2, 4), 1).astype(int)
+        ratio = np.maximum(
+            position / config.position_tolerance, velocity / config.velocity_tolerance
+        )
+        parts = np.ceil(np.clip(choices.AIM * ratio, 1e-9, 1e6) ** (1.0 / config.degree))
+        parts = np.where(ratio > share, np.clip(parts, 2, choices.MOST_PARTS), 1).astype(int)
         pieces = [
             np.linspace(mesh[i], mesh[i + 1], n + 1)[:-1] for i, n in enumerate(parts.tolist())
         ]

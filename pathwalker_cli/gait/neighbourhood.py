@@ -9,14 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.kkt import Answer, KktSystem
-
-__all__ = ["Derivative", "Neighbourhood"]
-
-_STEP = 1e-4
-"""Relative change of a number of the problem by which its derivatives are taken."""
 
 
 @dataclass(frozen=True)
@@ -73,10 +69,9 @@ class Neighbourhood:
         return np.asarray(self.kkt.parameter_hessian / np.outer(self._scale, self._scale))
 
     def rise(self, changes: Mapping[Unknown, float]) -> float:
-        """Return the rise of the cost to second order if unknowns move while the others follow.
+        """Return the rise of the cost to second order if unknowns move by so much [their unit].
 
-        Args:
-            changes: By how much every moved unknown differs from the optimum [its unit].
+        The others follow.
         """
         moved = [self.free.index(unknown) for unknown in changes]
         rest = [i for i in range(len(self.free)) if i not in moved]
@@ -88,14 +83,7 @@ class Neighbourhood:
         return float(self.cost_gradient[moved] @ step + step @ bend @ step / 2.0)
 
     def curvature(self, unknown: Unknown) -> float:
-        """Return the second derivative of the cost in one unknown while the others follow.
-
-        Args:
-            unknown: One of `free`.
-
-        Returns:
-            The derivative [1/unit^2].
-        """
+        """Return the second derivative of the cost in one of `free`; others follow [1/unit^2]."""
         which = self.free.index(unknown)
         return self.kkt.curvature(which) / float(self._scale[which]) ** 2
 
@@ -103,28 +91,26 @@ class Neighbourhood:
         """Return the derivatives by one unknown [its unit] while the others follow."""
         which = self.free.index(unknown)
         held = self.kkt.held(which)
-        step = _STEP * max(abs(self.optimum.value(unknown)), 0.01 * unknown.scale)
+        step = choices.DIFFERENCE * max(abs(self.optimum.value(unknown)), 0.01 * unknown.scale)
         return self._derivative(held, 1.0 / self._scale[which], step, {})
 
     def by_factor(self, place: str) -> Derivative:
         """Return the derivatives by a factor on a place in the patient's file, the unknowns follow.
 
-        Args:
-            place: The place; what the config scales there already is scaled on.
+        What the config scales there already is scaled on.
         """
         scale = self.optimum.config.variation.scale
         below, above = (
             self._moved({"variation.scale": {**scale, place: scale.get(place, 1.0) * factor}})
-            for factor in (1.0 - _STEP, 1.0 + _STEP)
+            for factor in (1.0 - choices.DIFFERENCE, 1.0 + choices.DIFFERENCE)
         )
-        answer = self.kkt.answer(below.program, above.program, _STEP)
-        return self._derivative(answer, 1.0, _STEP, {1: above, -1: below})
+        answer = self.kkt.answer(below.program, above.program, choices.DIFFERENCE)
+        return self._derivative(answer, 1.0, choices.DIFFERENCE, {1: above, -1: below})
 
     def changed_activity(self, other: Optimum) -> int:
-        """Return how many inequalities are clearly active in one optimum, clearly not in the other.
+        """Return how many inequalities are clearly active here, clearly not in another optimum.
 
-        Args:
-            other: An optimum on the same mesh.
+        Both are on the same mesh.
         """
         return self.kkt.changed(other.kkt)
 

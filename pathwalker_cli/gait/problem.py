@@ -8,24 +8,21 @@ controls their rates.  For fixed a, equation (2) increases strictly in the excit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from functools import cached_property
+from importlib import resources
+from pathlib import Path
 from typing import Final, Literal, cast
 
 import casadi as ca
 import numpy as np
+import pinocchio as pin
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.boundary import gait_boundary
-from pathwalker_cli.gait.costs import (
-    ACCELERATION_SIZE,
-    FORCE_SIZE,
-    RATE_SIZE,
-    Costs,
-    Instant,
-    Weights,
-)
+from pathwalker_cli.gait.costs import Costs, Instant, Weights
 from pathwalker_cli.model.contact import FORCES, PHASES, ContactForce, ContactPhase
 from pathwalker_cli.model.elements import element_forces, generalised_forces
 from pathwalker_cli.model.elements.muscle import (
@@ -35,19 +32,10 @@ from pathwalker_cli.model.elements.muscle import (
 )
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.frozen import FrozenTerms
-from pathwalker_cli.ocp.problem import (
-    INFINITY,
-    Boundary,
-    MultiPhaseProblem,
-    Phase,
-    Rows,
-    Variables,
-)
-
-__all__ = [
-    "Form",
-    "GaitProblem",
-]
+from pathwalker_cli.nlp.kernels import kernels
+from pathwalker_cli.nlp.tape_store import Makers, cache_folder, keep_tapes, kept_tapes
+from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
+from pathwalker_cli.ocp.problem import INFINITY, Boundary, MultiPhaseProblem, Phase, Rows, Variables
 
 VELOCITIES: Final = tuple(f"{name}_velocity" for name in COORDINATES)
 ACCELERATIONS: Final = tuple(f"{name}_acceleration" for name in COORDINATES)
@@ -58,49 +46,38 @@ Form = Literal["stride", "step", "passage"]
 """A periodic stride of eight phases, one step of a symmetric gait, or a stride from a recording
 that need not be periodic."""
 
-# What counts as 1 for the solver; with these the prototypes needed the fewest iterations.
-_VELOCITY, _FORCE, _HEIGHT = 5.0, 100.0, 0.1
+_MAKERS: Final[Makers] = (
+    pin.__version__,
+    Path(str(resources.files("pathwalker_cli.model.backends") / "libpinocchio_casadi.so")),
+)
+"""What makes the expressions of a gait beside the sources: Pinocchio, and its compiled back end."""
+
+_BUILT: Final[dict[Hashable, CollocationBlocks]] = {}
 
 
 class _Constants:
     """Symbols of the numbers that a patient and a config bring in, and their values."""
 
     def __init__(self, walker: Walker, costs: Costs) -> None:
-        body = walker.rigid_body
-        self.theta = ca.SX.sym("theta", len(body.parameter_names))
+        self._walker, self._costs = walker, costs
+        self.theta = ca.SX.sym("theta", len(walker.rigid_body.parameter_names))
         self.numbers = {number.address: ca.SX.sym(number.full_name) for number in walker.numbers}
         self.friction = ca.SX.sym("friction")
         self.weights = ca.SX.sym("weights", len(costs.weighed))
         self.cost_numbers = ca.SX.sym("cost_numbers", costs.size)
-        free = [unknown for unknown in walker.unknowns if walker.moves_bodies(unknown)]
-        self.slopes = {u.name: ca.SX.sym(f"{u.name}_slope", self.theta.numel()) for u in free}
+        self.moving = tuple(u for u in walker.unknowns if walker.moves_bodies(u))
+        self.slopes = [ca.SX.sym(f"{u.name}_slope", self.theta.numel()) for u in self.moving]
 
     @property
     def vector(self) -> ca.SX:
         """All constants, one after the other."""
-        return ca.vertcat(
-            self.theta,
-            *self.numbers.values(),
-            self.friction,
-            self.weights,
-            self.cost_numbers,
-            *self.slopes.values(),
-        )
+        numbers, rest = self.numbers.values(), (self.friction, self.weights, self.cost_numbers)
+        return ca.vertcat(self.theta, *numbers, *rest, *self.slopes)
 
-    def values(
-        self,
-        walker: Walker,
-        costs: Costs,
-        weights: Weights,
-        friction: float,
-        share: float,
-    ) -> np.ndarray:
+    def values(self, weights: Weights, friction: float, share: float) -> np.ndarray:
         """Return the values in the order of `vector`; of what is faded only a share acts."""
-        numbers = [
-            walker.values[number.address] * (share if number.faded else 1.0)
-            for number in walker.numbers
-        ]
-        free = {unknown.name: unknown for unknown in walker.unknowns}
+        walker, costs = self._walker, self._costs
+        numbers = [walker.values[n.address] * (share if n.faded else 1.0) for n in walker.numbers]
         return np.concatenate(
             [
                 walker.rigid_body.parameters,
@@ -108,7 +85,7 @@ class _Constants:
                 [friction],
                 [weights.get(name, 0.0) for name in costs.weighed],
                 costs.numbers(walker.weight),
-                *(walker.body_slopes(free[name]) for name in self.slopes),
+                *map(walker.body_slopes, self.moving),
             ]
         )
 
@@ -123,8 +100,7 @@ def _expansion(
 
     def expanded(*at: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
         x, rest = ca.SX.sym("x", len(moving)), ca.SX.sym("rest", len(fixed))
-        places = {**dict(zip(moving, ca.vertsplit(x), strict=True)),
-                  **dict(zip(fixed, ca.vertsplit(rest), strict=True))}  # fmt: skip
+        places = dict(zip((*moving, *fixed), ca.vertsplit(x) + ca.vertsplit(rest), strict=True))
         value = function(*(places[i] for i in range(len(arguments))))
         hessian, gradient = ca.hessian(value, x)
         terms = ca.Function("expansion", [x, rest], [value, gradient, hessian])
@@ -149,10 +125,11 @@ class GaitProblem:
         self.costs = replace(costs or Costs(), passage=form == "passage")
         self.phases = PHASES[: len(PHASES) // 2] if form == "step" else PHASES
         self.constants = _Constants(walker, self.costs)
-        scale = np.concatenate([np.ones(len(COORDINATES)), np.full(len(COORDINATES), _VELOCITY)])
+        scale = np.repeat([1.0, choices.VELOCITY_SIZE], len(COORDINATES))
         self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
+        self.q, self.v = ca.vertsplit(self.states.symbol, len(COORDINATES))
         self.activations = Variables.make("a", ACTIVATIONS, 1.0)
-        self.rates = Variables.make("rate", RATES, RATE_SIZE)
+        self.rates = Variables.make("rate", RATES, choices.RATE_SIZE)
         names = tuple(unknown.name for unknown in walker.unknowns)
         sizes = np.array([unknown.scale for unknown in walker.unknowns])
         self.parameters = Variables.make("parameters", names, sizes)
@@ -165,16 +142,6 @@ class GaitProblem:
         names, free = tuple(body.parameter_names), self.walker.unknowns
         parts = tuple((type(e).__name__, e.name) for e in self.walker.elements)
         return self.form, body.backend, body.topology, names, parts, free, self.costs.structure
-
-    @property
-    def q(self) -> ca.SX:
-        """Generalised coordinates."""
-        return self.states.symbol[: len(COORDINATES)]
-
-    @property
-    def v(self) -> ca.SX:
-        """Generalised velocities."""
-        return self.states.symbol[len(COORDINATES) :]
 
     def build(self) -> MultiPhaseProblem:
         """Return the problem's structure."""
@@ -204,25 +171,22 @@ class GaitProblem:
             friction: Coefficient of friction.
             orthosis_share: Share of the orthosis' fixed torques, below 1 to ease in a start.
         """
-        return self.constants.values(self.walker, self.costs, weights, friction, orthosis_share)
+        return self.constants.values(weights, friction, orthosis_share)
 
     @cached_property
-    def _numbers(self) -> dict[str, ca.SX]:
-        """Every named number by address: an unknown, or a constant."""
-        chosen = zip(self.walker.unknowns, ca.vertsplit(self.parameters.symbol), strict=True)
-        free = {address: symbol for unknown, symbol in chosen for address in unknown.addresses}
-        return {**self.constants.numbers, **free}
+    def _free(self) -> dict[str, ca.SX]:
+        """Symbols of the unknowns by the addresses that they set."""
+        symbols = ca.vertsplit(self.parameters.symbol)
+        chosen = zip(self.walker.unknowns, symbols, strict=True)
+        return {address: symbol for unknown, symbol in chosen for address in unknown.addresses}
 
     @cached_property
     def _theta(self) -> ca.SX:
         """Numbers of the rigid bodies, shifted by the unknowns that they depend on."""
-        theta = self.constants.theta
-        for unknown, symbol in zip(
-            self.walker.unknowns, ca.vertsplit(self.parameters.symbol), strict=True
-        ):
-            if unknown.name in self.constants.slopes:
-                home = self.constants.numbers[unknown.addresses[0]]
-                theta = theta + self.constants.slopes[unknown.name] * (symbol - home)
+        theta, constants = self.constants.theta, self.constants
+        for unknown, slope in zip(constants.moving, constants.slopes, strict=True):
+            address = unknown.addresses[0]
+            theta = theta + slope * (self._free[address] - constants.numbers[address])
         return theta
 
     @cached_property
@@ -237,7 +201,8 @@ class GaitProblem:
             return frozen.taylor(expansion, *(arguments[i] for i in varying))
 
         state = walker.state(*map(ca.vertsplit, (self.q, self.v, self.activations.symbol)))
-        forces = element_forces(walker.elements, state, self._numbers, curve)
+        numbers = {**self.constants.numbers, **self._free}
+        forces = element_forces(walker.elements, state, numbers, curve)
         names = walker.skeleton.coordinates
         total = generalised_forces(walker.elements, forces, names, ca.SX(1, 1))
         return ca.vertcat(*total), frozen
@@ -246,43 +211,39 @@ class GaitProblem:
         body, theta = self.walker.rigid_body, self._theta
         names = ACCELERATIONS + contact.force_names + RESERVES
         counts = [len(ACCELERATIONS), len(contact.forces), len(RESERVES)]
-        scale = np.repeat([ACCELERATION_SIZE, _FORCE, FORCE_SIZE], counts)
-        z = Variables.make("z", names, scale)
+        sizes = choices.ACCELERATION_SIZE, choices.CONTACT_FORCE_SIZE, choices.FORCE_SIZE
+        z = Variables.make("z", names, np.repeat(sizes, counts))
         vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
         tau, frozen = self._torques
-        active = list(contact.indices)
-        jacobian = body.point_jacobian(self.q, theta)[active, :]
+        jacobian = _of(body.point_jacobian(self.q, theta), contact.forces)
         balance = body.inverse_dynamics(self.q, self.v, vdot, theta) - tau - reserve
         balance -= jacobian.T @ force
-        motion = self._point_motion(vdot)
-        residual = Rows.join(
-            Rows.make(balance, tuple(f"{n} equation of motion" for n in COORDINATES), FORCE_SIZE),
-            Rows.make(
-                motion["acceleration"][active],
-                tuple(f"{n} contact acceleration" for n in contact.force_names),
-                FORCE_SIZE,
-            ),
-        )
+        position, velocity, acceleration = self._point_motion(vdot)
+        equations = tuple(f"{name} equation of motion" for name in COORDINATES)
+        still = "{0.name} contact acceleration"
         return Phase(
             name=contact.name,
             algebraic=z,
             derivative=ca.vertcat(self.v, vdot),
-            residual=residual,
-            path=self._path(contact, force, motion["position"]),
-            end=self._touch_down(contact.touched_down(following), motion),
+            residual=Rows.join(
+                Rows.make(balance, equations, choices.FORCE_SIZE),
+                _rows(acceleration, contact.forces, still, choices.FORCE_SIZE),
+            ),
+            path=self._path(contact, force, position),
+            end=self._touch_down(contact.touched_down(following), position, velocity, acceleration),
             fixed_at_end=self._fixed_at_end(contact, following),
             integrands=self._integrands(contact, vdot, force, reserve),
             frozen=frozen,
         )
 
-    def _point_motion(self, vdot: ca.SX) -> dict[str, ca.SX]:
+    def _point_motion(self, vdot: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Return positions, velocities and accelerations of the contact points, (8,) each."""
-        body, theta = self.walker.rigid_body, self._theta
-        return {
-            "position": body.point_positions(self.q, theta),
-            "velocity": body.point_velocities(self.q, self.v, theta),
-            "acceleration": body.point_accelerations(self.q, self.v, vdot, theta),
-        }
+        body, theta, q, v = self.walker.rigid_body, self._theta, self.q, self.v
+        return (
+            body.point_positions(q, theta),
+            body.point_velocities(q, v, theta),
+            body.point_accelerations(q, v, vdot, theta),
+        )
 
     def _integrands(
         self, contact: ContactPhase, vdot: ca.SX, force: ca.SX, reserve: ca.SX
@@ -305,48 +266,31 @@ class GaitProblem:
 
     def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
         """Return heights of the points in the air and the friction cones of the loaded feet."""
-        heights = [f for f in FORCES if f.bears and f.point not in contact.points]
-        rows = [
-            Rows.make(
-                position[[FORCES.index(f) for f in heights]],
-                tuple(f"{f.point.name} height" for f in heights),
-                _HEIGHT,
-                0.0,
-                INFINITY,
-            )
-        ]
+        airborne = [f for f in FORCES if f.bears and f.point not in contact.points]
+        rows = [_rows(position, airborne, "{0.point.name} height", choices.HEIGHT_SIZE, INFINITY)]
         for side in sorted(contact.feet):
             parts = [(f, force[i]) for i, f in enumerate(contact.forces) if f.point.side == side]
             normal = sum(value for f, value in parts if f.bears)
             tangent = sum(value for f, value in parts if not f.bears)
             cone = self.constants.friction * normal
             value = ca.vertcat(cone - tangent, cone + tangent)
-            rows.append(Rows.make(value, _friction_names(side), _FORCE, 0.0, INFINITY))
+            names = _friction_names(side)
+            rows.append(Rows.make(value, names, choices.CONTACT_FORCE_SIZE, 0.0, INFINITY))
         return Rows.join(*rows)
 
-    def _touch_down(self, directions: Sequence[ContactForce], motion: Mapping[str, ca.SX]) -> Rows:
+    @staticmethod
+    def _touch_down(
+        directions: Sequence[ContactForce], position: ca.SX, velocity: ca.SX, acceleration: ca.SX
+    ) -> Rows:
         """Return the rows that let new points meet the ground without impact and without force.
 
         Zero acceleration of a new point just before contact is the same as zero force just after.
         """
-        lifts = [f for f in directions if f.bears]
-        index = [FORCES.index(f) for f in directions]
+        upward = [f for f in directions if f.bears]
         return Rows.join(
-            Rows.make(
-                motion["position"][[FORCES.index(f) for f in lifts]],
-                tuple(f"{f.point.name} touch-down" for f in lifts),
-                _HEIGHT,
-            ),
-            Rows.make(
-                motion["velocity"][index],
-                tuple(f"{f.name} touch-down velocity" for f in directions),
-                1.0,
-            ),
-            Rows.make(
-                motion["acceleration"][index],
-                tuple(f"{f.name} touch-down force" for f in directions),
-                FORCE_SIZE,
-            ),
+            _rows(position, upward, "{0.point.name} touch-down", choices.HEIGHT_SIZE),
+            _rows(velocity, directions, "{0.name} touch-down velocity"),
+            _rows(acceleration, directions, "{0.name} touch-down force", choices.FORCE_SIZE),
         )
 
     @staticmethod
@@ -362,21 +306,13 @@ class GaitProblem:
     def _excitation_rows(self) -> Rows:
         """Return 0 <= e <= 1 as two linear rows in activation and rate."""
         a, rate = self.activations.symbol, self.rates.symbol
+        above, below = (
+            tuple(f"{name} excitation {word}" for name in GENERATORS)
+            for word in ("above 0", "below 1")
+        )
         return Rows.join(
-            Rows.make(
-                DEACTIVATION_TIME * rate + a,
-                tuple(f"{n} excitation above 0" for n in GENERATORS),
-                1.0,
-                0.0,
-                INFINITY,
-            ),
-            Rows.make(
-                ACTIVATION_TIME * rate + a,
-                tuple(f"{n} excitation below 1" for n in GENERATORS),
-                1.0,
-                -INFINITY,
-                1.0,
-            ),
+            Rows.make(DEACTIVATION_TIME * rate + a, above, 1.0, 0.0, INFINITY),
+            Rows.make(ACTIVATION_TIME * rate + a, below, 1.0, -INFINITY, 1.0),
         )
 
     def _boundary(self) -> Boundary:
@@ -392,22 +328,52 @@ class GaitProblem:
 
     def _standing(self) -> Rows:
         """Return the rows that let the first phase begin on the ground and at rest there."""
-        contact, motion = self.phases[0], self._point_motion(ca.SX.zeros(len(COORDINATES)))
-        vertical = [f for f in contact.forces if f.bears]
+        forces = self.phases[0].forces
+        position, velocity, _ = self._point_motion(ca.SX.zeros(len(COORDINATES)))
+        upward = [f for f in forces if f.bears]
         return Rows.join(
-            Rows.make(
-                motion["position"][[FORCES.index(f) for f in vertical]],
-                tuple(f"{f.point.name} height at the start" for f in vertical),
-                _HEIGHT,
-            ),
-            Rows.make(
-                motion["velocity"][list(contact.indices)],
-                tuple(f"{n} velocity at the start" for n in contact.force_names),
-                1.0,
-            ),
+            _rows(position, upward, "{0.point.name} height at the start", choices.HEIGHT_SIZE),
+            _rows(velocity, forces, "{0.name} velocity at the start"),
         )
+
+
+def _of(values: ca.SX, forces: Sequence[ContactForce]) -> ca.SX:
+    """Return the rows, among those of all `FORCES`, of some of them."""
+    return values[[force.index for force in forces], :]
+
+
+def _rows(
+    values: ca.SX, forces: Sequence[ContactForce], name: str, scale: float = 1.0, upper: float = 0.0
+) -> Rows:
+    """Return constraint rows in the directions of some forces; `name` is filled in with each."""
+    return Rows.make(_of(values, forces), tuple(name.format(f) for f in forces), scale, 0.0, upper)
 
 
 def _friction_names(side: Side) -> tuple[str, str]:
     foot = f"foot_{SUFFIX[side]}"
     return f"{foot} forward friction", f"{foot} backward friction"
+
+
+def gait_blocks(gait: GaitProblem, degree: int) -> CollocationBlocks:
+    """Return the collocation blocks of a gait problem with so many Radau points in an interval.
+
+    All that a patient or a config brings in is a number of the problem: problems of equal structure
+    share their blocks and all derivatives, which are built once in a process.
+    """
+    key = (gait.structure, degree)
+    if key not in _BUILT:
+        kept = None if kernels() is None else kept_tapes(key, _MAKERS)
+        _BUILT[key] = CollocationBlocks(gait.build(), degree, kept)
+        if kept is None:
+            _keep(_BUILT[key], key)
+    return _BUILT[key]
+
+
+def _keep(blocks: CollocationBlocks, key: Hashable) -> None:
+    """Keep the tapes of blocks for other processes, if there are tapes and a place for them."""
+    if kernels() is None or cache_folder() is None:
+        return
+    derived = [block for block in blocks.blocks if block.matters]
+    tapes = {b.name: (b.rows, b.tapes) for b in derived if b.tapes is not None}
+    if len(tapes) == len(derived):
+        keep_tapes(key, tapes, _MAKERS)

@@ -10,9 +10,9 @@ import numpy as np
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.gait.symmetry import full_stride
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult, NlpSolver, warm_pushes
@@ -21,14 +21,6 @@ from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.verify import Reintegration, reintegrate
-
-__all__ = ["Optimum", "Resolver", "WarmStart", "warm_start_for"]
-
-_WATCHDOG: Final = {"watchdog_shortened_iter_trigger": 1, "watchdog_trial_iter_max": 30}
-"""A neighbour further off is reached by full steps that the filter alone would cut to nothing."""
-
-_WARM_ITERATIONS: Final = 150
-"""Iterations after which a warm start is given up; most take about ten, far ones about fifty."""
 
 
 @dataclass(frozen=True)
@@ -44,18 +36,8 @@ class WarmStart:
     push: float | None = None
 
 
-# The further a neighbour, the more bounds become active or inactive on the way to it, and from
-# close to the bounds steps are cut to a few per cent for dozens of iterations.
 _NEAR: Final = WarmStart()
-_FURTHER: Final = WarmStart(1e-6, 3e-4)
-_FAR: Final = WarmStart(1e-5, 1e-2)
-_NEAR_ROWS: Final = 2e-3
-"""Largest root mean square violation of rows [solver units] by the start of a near neighbour."""
-_FURTHER_ROWS: Final = 1e-2
-"""The same for one further off: strengths that vary by 10 % reach 7e-3; masses and lengths, which
-need another start, begin at 1.5e-2."""
-_NEAR_BOUNDS: Final = 0.2
-"""Largest violation of a bound [solver units] by the start of a near one; 5 % of a spring: 0.1."""
+_FURTHER, _FAR = WarmStart(*choices.FURTHER_START), WarmStart(*choices.FAR_START)
 
 
 @dataclass(frozen=True)
@@ -80,7 +62,7 @@ class Optimum:
     @property
     def config(self) -> StudyConfig:
         """What was asked for."""
-        return self.case.config
+        return self.solver.config
 
     @property
     def converged(self) -> bool:
@@ -95,12 +77,11 @@ class Optimum:
     @cached_property
     def motion(self) -> PhasedMotion:
         """The motion of a whole stride."""
-        motion = self.program.to_motion(self.result.unknowns)
-        return full_stride(motion) if self.config.half_cycle else motion
+        return self.solver.whole_stride(self.program, self.result)
 
     @property
     def walker(self) -> Walker:
-        """Who walks, with the numbers that were found."""
+        """Who walks, with the numbers of the optimum."""
         return self.solver.walker.with_parameters(self.motion.parameters)
 
     @property
@@ -221,8 +202,8 @@ class Resolver:
             lowest = min(solver.refined_barrier, 0.1 * self._tolerance)
             settings = self._solver.settings(self._tolerance, start.barrier or lowest, warm=True)
             pushes = {} if start.push is None else warm_pushes(start.push)
-            extra = {**_WATCHDOG, **pushes, **settings.extra}
-            settings = replace(settings, max_iterations=_WARM_ITERATIONS, extra=extra)
+            extra = {**choices.WATCHDOG, **pushes, **settings.extra}
+            settings = replace(settings, max_iterations=choices.WARM_ITERATIONS, extra=extra)
             self._warm_solvers[start] = NlpSolver(self._program, settings)
         return self._warm_solvers[start]
 
@@ -239,9 +220,9 @@ def warm_start_for(program: CollocationProgram, start: np.ndarray) -> WarmStart:
     missed = _outside(np.asarray(rows).ravel(), *program.row_bounds)
     rms = float(np.sqrt(np.mean(missed**2)))
     beyond = float(_outside(start, *program.bounds).max())
-    if rms > _FURTHER_ROWS:
+    if rms > choices.FURTHER_ROWS:
         return _FAR
-    return _NEAR if rms < _NEAR_ROWS and beyond < _NEAR_BOUNDS else _FURTHER
+    return _NEAR if rms < choices.NEAR_ROWS and beyond < choices.NEAR_BOUNDS else _FURTHER
 
 
 def _outside(values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:

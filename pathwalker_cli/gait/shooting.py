@@ -1,54 +1,40 @@
-"""Gait problems by direct multiple shooting, with the neural excitations as controls."""
+"""Gait problems by direct multiple shooting, with the neural excitations as controls.
+
+It begins with the solution by collocation.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
 from pathwalker_cli.conventions import GENERATORS
-from pathwalker_cli.errors import InputError
+from pathwalker_cli.errors import ConfigError, InputError
+from pathwalker_cli.gait import choices
+from pathwalker_cli.gait.cost_terms import prediction_terms
 from pathwalker_cli.gait.problem import GaitProblem
+from pathwalker_cli.gait.solution import GaitSolution, StageRecord
+from pathwalker_cli.gait.solve import GaitSolver, StageObserver
+from pathwalker_cli.gait.symmetry import full_stride
 from pathwalker_cli.model.elements.muscle import (
     ACTIVATION_TIME,
     DEACTIVATION_TIME,
     excitation_from_rate,
 )
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
-from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import ProblemNumbers, Variables
 from pathwalker_cli.ocp.shooting import ShootingProgram
 from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks, ShootingProblem
 from pathwalker_cli.ocp.shooting_motion import Shooter, ShootingNodes
-from pathwalker_cli.ocp.violations import Violation, largest_violations
-
-__all__ = [
-    "EXCITATIONS",
-    "ShootingRound",
-    "ShootingSettings",
-    "ShootingSolution",
-    "gait_shooting",
-    "rounded_rate",
-    "solve_shooting",
-]
+from pathwalker_cli.ocp.violations import Violation, active_bounds, largest_violations
+from pathwalker_cli.stride.verify import reintegrate
 
 EXCITATIONS: Final = tuple(f"{name}_excitation" for name in GENERATORS)
-
-_FIRST_BARRIER, _FIRST_PUSH = 1e-5, 1e-3
-"""Barrier and distance from the bounds at the start: a larger barrier leaves the neighbourhood of
-the motion that is handed in, a smaller distance blocks the first steps."""
-
-_NEXT_PUSH = 1e-8
-"""Distance from the bounds in later rounds: they start where the round before ended."""
-
-_BARRIER_SHARE = 1e-2
-"""Barrier at the end of a round, as a share of its tolerance; the next round begins with it."""
-
-Observer = Callable[[str, ProgressReport], None]
 
 
 @dataclass(frozen=True)
@@ -75,33 +61,6 @@ class ShootingSettings:
 
 
 @dataclass(frozen=True)
-class ShootingRound:
-    """One round: steps chosen anew, then a solve.
-
-    Args:
-        rounding: Half width of the rounded kink.
-        status: "converged" or the reason why not.
-        steps: Number of integration steps.
-        unknowns: Size of the nonlinear program.
-        iterations: Iterations.
-        seconds: Wall seconds of the solve.
-        seconds_functions: Part of them in function evaluations.
-        cost: Value of the objective.
-        integration_error: Largest error estimate of a step at the end of the round.
-    """
-
-    rounding: float
-    status: str
-    steps: int
-    unknowns: int
-    iterations: int
-    seconds: float
-    seconds_functions: float
-    cost: float
-    integration_error: float
-
-
-@dataclass(frozen=True)
 class ShootingSolution:
     """The end of a solve by multiple shooting, converged or not.
 
@@ -115,7 +74,7 @@ class ShootingSolution:
         defect: Largest gap between the end of an interval, integrated anew with equation (2)
             itself, and its node, in scaled states.
         violations: Largest violations, largest first.
-        rounds: The rounds.
+        rounds: The rounds, in each of which steps were chosen anew.
         seconds_build: Wall seconds for blocks and programs.
         nlp: What the nonlinear solver returned last.
         program: The last program.
@@ -129,7 +88,7 @@ class ShootingSolution:
     integration_error: float
     defect: float
     violations: tuple[Violation, ...]
-    rounds: tuple[ShootingRound, ...]
+    rounds: tuple[StageRecord, ...]
     seconds_build: float
     nlp: NlpResult = field(repr=False)
     program: ShootingProgram = field(repr=False)
@@ -138,21 +97,6 @@ class ShootingSolution:
     def converged(self) -> bool:
         """Whether all tolerances are met."""
         return self.status == "converged"
-
-    @property
-    def durations(self) -> np.ndarray:
-        """Phase durations [s]."""
-        return self.nodes.durations
-
-    @property
-    def distance(self) -> float:
-        """Distance of the motion [m]."""
-        return float(self.nodes.states[-1][-1, 0] - self.nodes.states[0][0, 0])
-
-    @property
-    def walking_speed(self) -> float:
-        """Mean speed [m/s]."""
-        return self.distance / float(self.durations.sum())
 
     @property
     def seconds(self) -> float:
@@ -186,8 +130,7 @@ def gait_shooting(gait: GaitProblem) -> ShootingProblem:
     problem = gait.build()
     if not problem.sample.is_zero():
         raise InputError(
-            "a fit of recorded instants has no multiple-shooting form",
-            mend="use collocation",
+            "a fit of recorded instants has no multiple-shooting form", mend="use collocation"
         )
     controls = Variables.make("e", EXCITATIONS, 1.0)
     return ShootingProblem(problem, controls, rounded_rate, excitation_from_rate)
@@ -198,7 +141,7 @@ def solve_shooting(
     numbers: ProblemNumbers,
     motion: PhasedMotion,
     settings: ShootingSettings | None = None,
-    observer: Observer | None = None,
+    observer: StageObserver | None = None,
 ) -> ShootingSolution:
     """Solve a gait problem by direct multiple shooting on the mesh of a motion.
 
@@ -218,11 +161,8 @@ def solve_shooting(
     settings = settings or ShootingSettings()
     began = time.perf_counter()
     blocks = ShootingBlocks(gait_shooting(gait))
-    excitations: dict[tuple[str, ...], tuple[float, float]]
-    excitations = {(name,): (0.0, 1.0) for name in EXCITATIONS}
-    bounded = ProblemNumbers(
-        numbers.shared, numbers.bounds.replace(excitations), numbers.point_data
-    )
+    excited = numbers.bounds.replace({(name,): (0.0, 1.0) for name in EXCITATIONS})
+    bounded = ProblemNumbers(numbers.shared, excited, numbers.point_data)
     search = _Search(blocks, bounded, ShootingNodes.of(blocks.shooting, motion), settings, observer)
     while not search.done:
         search.advance()
@@ -238,11 +178,12 @@ class _Search:
         numbers: ProblemNumbers,
         nodes: ShootingNodes,
         settings: ShootingSettings,
-        observer: Observer | None,
+        observer: StageObserver | None,
     ) -> None:
         self.blocks, self.numbers, self.nodes = blocks, numbers, nodes
         self.settings, self.observer = settings, observer
-        self.rounds: list[ShootingRound] = []
+        self.rounds: list[StageRecord] = []
+        self.error = np.inf
         self.program: ShootingProgram
         self.result: NlpResult
 
@@ -252,7 +193,7 @@ class _Search:
 
     @property
     def _accurate(self) -> bool:
-        return self.rounds[-1].integration_error <= self.settings.integration_tolerance
+        return self.error <= self.settings.integration_tolerance
 
     @property
     def done(self) -> bool:
@@ -265,33 +206,18 @@ class _Search:
         """Choose steps and solve."""
         settings, number = self.settings, len(self.rounds)
         rounding = settings.roundings[min(number, len(settings.roundings) - 1)]
-        # a third of the tolerance is aimed at: the next solution moves a little
-        edges = self.shooter.choose(settings.integration_tolerance / 3)
-        self.program = ShootingProgram(
-            self.blocks, self.numbers, self.nodes.meshes, edges, rounding
-        )
+        edges = self.shooter.choose(settings.integration_tolerance / choices.STEP_MARGIN)
+        meshes = self.nodes.meshes
+        self.program = ShootingProgram(self.blocks, self.numbers, meshes, edges, rounding)
         name = f"rounding {rounding:g}"
-        watch = None if self.observer is None else _named(self.observer, name)
-        self.result = solve_program(
-            self.program,
-            self.program.from_nodes(self.nodes),
-            self._ipopt(),
-            observer=watch,
-        )
+        watch = None if self.observer is None else partial(self.observer, name)
+        start = self.program.from_nodes(self.nodes)
+        self.result = solve_program(self.program, start, self._ipopt(), observer=watch)
         self.nodes = self.program.nodes(self.result.unknowns)
-        self.rounds.append(
-            ShootingRound(
-                rounding,
-                self.result.status,
-                sum(len(ends) - 1 for intervals in edges for ends in intervals),
-                self.program.size,
-                self.result.iterations,
-                self.result.seconds,
-                self.result.seconds_functions,
-                self.result.objective,
-                self.shooter.error(edges),
-            )
-        )
+        self.error = self.shooter.error(edges)
+        intervals = sum(len(mesh) - 1 for mesh in meshes)
+        name = f"shooting, kink {rounding:g}"
+        self.rounds.append(StageRecord.of(name, self.result, intervals, self.program.size))
 
     def _ipopt(self) -> IpoptSettings:
         """Return settings that start near a motion without multipliers.
@@ -300,13 +226,14 @@ class _Search:
         them IPOPT estimates those of the rows by least squares.
         """
         settings, first = self.settings, not self.rounds
-        push = _FIRST_PUSH if first else _NEXT_PUSH
+        push = choices.SHOOTING_PUSH if first else choices.NEXT_PUSH
+        later = choices.ROUND_BARRIER_SHARE * settings.tolerance
         pushes = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
         return IpoptSettings(
             tolerance=settings.tolerance,
             constraint_tolerance=settings.constraint_tolerance,
             max_iterations=settings.max_iterations,
-            initial_barrier=_FIRST_BARRIER if first else _BARRIER_SHARE * settings.tolerance,
+            initial_barrier=choices.SHOOTING_BARRIER if first else later,
             extra={
                 "bound_mult_init_method": "mu-based",
                 "constr_mult_init_max": 1e8,
@@ -327,7 +254,7 @@ class _Search:
             running_costs=dict(zip(names, costs.tolist(), strict=True)),
             nodes=self.nodes,
             motion=shooter.motion(edges),
-            integration_error=self.rounds[-1].integration_error,
+            integration_error=self.error,
             defect=shooter.defect(edges),
             violations=largest_violations(self.program, self.result),
             rounds=tuple(self.rounds),
@@ -337,5 +264,57 @@ class _Search:
         )
 
 
-def _named(observer: Observer, name: str) -> Callable[[ProgressReport], None]:
-    return lambda report: observer(name, report)
+def solve_by_shooting(solver: GaitSolver, warm_start: PhasedMotion | None = None) -> GaitSolution:
+    """Solve by collocation, then by multiple shooting on the same mesh.
+
+    Returns:
+        The solution by multiple shooting; that by collocation if it did not converge.
+
+    Raises:
+        ConfigError: If the study fits a recording: shooting solves predictions only.
+    """
+    config = solver.config
+    if config.fits:
+        raise ConfigError(
+            f"is multiple-shooting, but {config.problem} fits a recording",
+            where="transcription",
+            mend="set transcription to collocation",
+        )
+    collocation = solver.solve(warm_start)
+    if not collocation.converged:
+        return collocation
+    first = collocation.last_motion
+    first = replace(first, phases=first.phases[: len(solver.gait.phases)])
+    settings = ShootingSettings(constraint_tolerance=config.solver.constraint_tolerance)
+    shooting = solve_shooting(solver.gait, solver.prediction, first, settings, solver.observer)
+    return _solution(collocation, solver, shooting)
+
+
+def _solution(
+    collocation: GaitSolution, solver: GaitSolver, shooting: ShootingSolution
+) -> GaitSolution:
+    """Return the solution by shooting in the form of every other one."""
+    began = time.perf_counter()
+    errors = reintegrate(solver.walker, shooting.motion)
+    seconds = dict(collocation.seconds)
+    seconds["verify"] += time.perf_counter() - began
+    seconds["build"] += shooting.seconds_build
+    seconds["solve"] += shooting.seconds
+    motion, costs = shooting.motion, shooting.running_costs
+    if solver.config.half_cycle:
+        motion = full_stride(motion)
+        costs = {name: 2 * value for name, value in costs.items()}
+    return replace(
+        collocation,
+        status=shooting.status,
+        last_motion=motion,
+        nlp=shooting.nlp,
+        cost=shooting.cost,
+        cost_terms=prediction_terms(motion, costs, solver.gait.costs, solver.config.cost.weights),
+        violations=shooting.violations,
+        active=active_bounds(shooting.program, shooting.nlp),
+        reintegration=errors,
+        start=f"collocation from {collocation.start}, cost {collocation.cost:.6g}",
+        stages=collocation.stages + shooting.rounds,
+        seconds=seconds,
+    )

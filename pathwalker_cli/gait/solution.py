@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
+from typing import Any, Final
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.bounds import GaitBounds
-from pathwalker_cli.gait.shortfall import Shortfall
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion
@@ -18,10 +19,51 @@ from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.verify import Reintegration, second_engine_residual
 
-__all__ = ["TOO_WEAK", "GaitSolution", "LocalOptimum", "StageRecord"]
-
 TOO_WEAK: Final = "the muscles are too weak for a walk within the bounds"
-"""Status of a solve that found which torques are lacking."""
+"""Status of a solve that ended in which torques are lacking."""
+
+
+@dataclass(frozen=True)
+class MissingTorque:
+    """What a muscle torque generator lacks.
+
+    Args:
+        generator: Its name in `conventions.GENERATORS`.
+        torque: The largest missing torque [N m].
+        strength: Its maximum isometric torque [N m].
+        percent: When, in percent of the stride.
+    """
+
+    generator: str
+    torque: float
+    strength: float
+    percent: float
+
+
+@dataclass(frozen=True)
+class Shortfall:
+    """Why no motion was found.
+
+    A solve that fails is tried again by way of reserve actuators at the joints.  If the walk is not
+    found without them, what is left of them says whether the muscles are too weak.
+
+    Args:
+        within_bounds: Whether muscles of any strength can walk within the bounds, as far as known.
+        missing: What the muscles lack for it, the largest share of a strength first.
+    """
+
+    within_bounds: bool
+    missing: tuple[MissingTorque, ...] = ()
+
+    @property
+    def too_weak(self) -> bool:
+        """Whether the muscles are too weak for a motion that the bounds allow."""
+        return self.within_bounds and bool(self.missing)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        missing = [dict(vars(torque)) for torque in self.missing]
+        return {"within_bounds": self.within_bounds, "missing_torques": missing}
 
 
 @dataclass(frozen=True)
@@ -45,6 +87,12 @@ class StageRecord:
     iterations: int
     seconds: float
     seconds_functions: float
+
+    @classmethod
+    def of(cls, name: str, result: NlpResult, intervals: int, unknowns: int) -> StageRecord:
+        """Return the record of a stage from how its solve ended."""
+        iterations, seconds = result.iterations, (result.seconds, result.seconds_functions)
+        return cls(name, result.status, intervals, unknowns, iterations, *seconds)
 
 
 @dataclass(frozen=True)
@@ -159,3 +207,20 @@ class GaitSolution:
     def iterations(self) -> int:
         """Iterations over all stages."""
         return sum(stage.iterations for stage in self.stages)
+
+
+def missing_torques(series: GaitSeries) -> tuple[MissingTorque, ...]:
+    """Return what the muscles lack in a stride that reserve actuators help along."""
+    largest = sorted(_largest_help(series), key=lambda each: -each.torque / each.strength)
+    return tuple(each for each in largest if each.torque > choices.LEAST_LACK * each.strength)
+
+
+def _largest_help(series: GaitSeries) -> Iterator[MissingTorque]:
+    """Yield the largest help for each generator; help against it is help for its antagonist."""
+    walker = series.walker
+    for muscle, strength in zip(walker.muscles, walker.max_isometric_torque, strict=True):
+        row = walker.skeleton.index(muscle.coordinate)
+        help_ = muscle.torque_sign * series.reserve[:, row]
+        k = int(help_.argmax())
+        percent = 100.0 * float(series.time[k] / series.time[-1])
+        yield MissingTorque(muscle.name, float(help_[k]), float(strength), percent)

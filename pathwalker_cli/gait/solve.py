@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.config import MeshConfig, StudyConfig
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
     gait_bounds,
@@ -20,12 +21,22 @@ from pathwalker_cli.gait.bounds import (
 )
 from pathwalker_cli.gait.cost_terms import cost_terms, with_goal_costs
 from pathwalker_cli.gait.costs import Weights
-from pathwalker_cli.gait.passage import passage_samples, recorded_passage
-from pathwalker_cli.gait.problem import Form, GaitProblem
-from pathwalker_cli.gait.shortfall import Shortfall, missing_torques
-from pathwalker_cli.gait.solution import TOO_WEAK, GaitSolution, StageRecord
-from pathwalker_cli.gait.start import ReferenceStride, reference_stride, start_recording
-from pathwalker_cli.gait.structures import gait_blocks
+from pathwalker_cli.gait.problem import Form, GaitProblem, gait_blocks
+from pathwalker_cli.gait.recorded import (
+    passage_samples,
+    recorded_passage,
+    recorded_stride,
+    start_recording,
+)
+from pathwalker_cli.gait.solution import (
+    TOO_WEAK,
+    GaitSolution,
+    Shortfall,
+    StageRecord,
+    missing_torques,
+)
+from pathwalker_cli.gait.start import ReferenceStride
+from pathwalker_cli.gait.stylised import stylised_stride
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
@@ -38,37 +49,9 @@ from pathwalker_cli.ocp.violations import active_bounds, largest_violations
 from pathwalker_cli.stride.series import gait_series
 from pathwalker_cli.stride.verify import Reintegration, reintegrate
 
-__all__ = ["GaitSolver", "solve_study"]
-
-_TRACKING = {"tracking": 10.0, "reserve": 10.0, "smoothing": 0.1}
-"""Weights of the first stage: follow the stride, carried by reserve forces where needed."""
-
-_TRACKING_TOLERANCE, _TRACKING_BARRIER = 1e-2, 0.1
-"""A start need not be exact; far from any solution a large barrier takes the fewest iterations."""
-
-_HELPED = {"effort": 1e-2, "rate": 2e-4, "acceleration": 1e-5, "reserve": 10.0}
-"""Weights by which reserves at the joints help a solve that failed: hardly any effort matters."""
-
-_LEAST_HELP = {**_HELPED, "reserve": 1e3}
-"""Weights of the least help: what is left of the reserves is what the muscles lack."""
-
-_PATIENCE = 400
-"""Iterations on the first mesh after which reserves have to help; most need 60 to 300."""
-
-_FADED = 0.02
-"""Share of the orthosis that acts in the first stage."""
-
-_BARRIER_SHARE = 1e-2
-"""Barrier, as a share of the tolerance of the stage before, that a warm start begins with."""
-
-_EAGER_ROUND, _EAGER_SHARE = 4, 0.3
-"""Round from which intervals are split at a share of the tolerance already: the solution moves
-from round to round, and would take the error to another interval that just met it before."""
-
-_MESHING = 1e-6
-"""Relative tolerance of the integrator that a mesh is refined by; errors to find are 1e-3."""
-
 StageObserver = Callable[[str, ProgressReport], None]
+Stage = tuple[CollocationProgram, NlpResult]
+"""A solved stage."""
 
 
 @dataclass
@@ -120,20 +103,6 @@ class GaitSolver:
         return "step"
 
     @property
-    def weights(self) -> dict[str, float]:
-        """Weights of the prediction by cost term."""
-        cost = self.config.cost
-        return {
-            "effort": cost.effort_weight,
-            "rate": cost.rate_weight,
-            "acceleration": cost.acceleration_weight,
-            "walking_speed": cost.walking_speed_weight,
-            "fit": cost.fit_weight,
-            "excitation": cost.excitation_weight,
-            **cost.goals,
-        }
-
-    @property
     def free(self) -> tuple[Unknown, ...]:
         """The unknowns that may move within their ranges."""
         ranges = self.bounds.ranges
@@ -143,9 +112,11 @@ class GaitSolver:
     def stride(self) -> ReferenceStride:
         """The stride that a solve without warm start begins with; of a fit, what is followed."""
         start = self.config.start
-        if self.config.fits:
-            return recorded_passage(self.walker, start_recording(self.walker, start))
-        return reference_stride(self.walker, start, self.start_speed)
+        if start.gait == "recorded":
+            follow = recorded_passage if self.config.fits else recorded_stride
+            return follow(self.walker, start_recording(self.walker, start))
+        crouch, ratio = start.knee_flexion, start.stride_ratio
+        return stylised_stride(self.walker, self.start_speed, crouch, ratio)
 
     @property
     def start_speed(self) -> float:
@@ -168,19 +139,23 @@ class GaitSolver:
         lower, upper = self.bounds.table.arrays(tuple(u.name for u in walker.unknowns))
         return np.clip(values, lower, upper)
 
+    def by_name(self, parameters: np.ndarray) -> dict[str, float]:
+        """Return values of the walker's unknowns (k,) by name."""
+        pairs = zip(self.walker.unknowns, parameters, strict=True)
+        return {unknown.name: float(value) for unknown, value in pairs}
+
     def numbers(
         self, weights: Weights, table: BoundTable, orthosis_share: float = 1.0
     ) -> ProblemNumbers:
         """Return the numbers of a stage."""
         friction = self.config.bounds.friction
         shared = self.gait.shared_values(weights, friction, orthosis_share)
-        reference = self.stride.coordinates
-        return ProblemNumbers(shared, table, lambda i, at: reference(i, at), self.samples)
+        return ProblemNumbers(shared, table, self.stride.coordinates, self.samples)
 
     @cached_property
     def prediction(self) -> ProblemNumbers:
         """The numbers of the problem itself."""
-        return self.numbers(self.weights, self.bounds.table)
+        return self.numbers(self.config.cost.weights, self.bounds.table)
 
     def stage(
         self,
@@ -188,33 +163,19 @@ class GaitSolver:
         motion: PhasedMotion,
         numbers: ProblemNumbers,
         settings: IpoptSettings,
-        before: tuple[CollocationProgram, NlpResult] | None = None,
-    ) -> tuple[CollocationProgram, NlpResult]:
+        before: Stage | None = None,
+    ) -> Stage:
         """Solve one stage from a motion, and from the multipliers of a stage before; record it."""
         began = time.perf_counter()
         program = CollocationProgram(self.blocks, numbers, motion.meshes)
         multipliers = transferred(before[0], before[1].multipliers, program) if before else None
-        observer = None if self.observer is None else self._named(name)
+        observer = None if self.observer is None else partial(self.observer, name)
         start = program.to_unknowns(motion)
         result = solve_program(program, start, settings, multipliers, observer)
-        record = StageRecord(
-            name,
-            result.status,
-            motion.intervals,
-            program.size,
-            result.iterations,
-            result.seconds,
-            result.seconds_functions,
-        )
-        self.stages.append(record)
+        self.stages.append(StageRecord.of(name, result, motion.intervals, program.size))
         self.seconds["solve"] += result.seconds
         self.seconds["build"] += time.perf_counter() - began - result.seconds
         return program, result
-
-    def _named(self, name: str) -> Callable[[ProgressReport], None]:
-        observer = self.observer
-        assert observer is not None  # noqa: S101 - asked for only where there is one
-        return lambda report: observer(name, report)
 
     def settings(self, tolerance: float, barrier: float, warm: bool = False) -> IpoptSettings:
         """Return the settings of a stage: optimality tolerance, first barrier, warm multipliers."""
@@ -235,53 +196,56 @@ class GaitSolver:
             warm_start: An earlier motion of the same condition to begin with; otherwise the stride
                 of the config is tracked first.
         """
-        config, solver = self.config, self.config.solver
+        solver, tolerance = self.config.solver, self.config.solver.tolerance
         self.shortfall = None
-        loose = max(solver.tolerance, solver.first_tolerance) if config.mesh.refinements else 0.0
+        if self.config.mesh.refinements:
+            tolerance = max(tolerance, solver.first_tolerance)
         if warm_start is None:
             program, result = self._track()
             motion = program.to_motion(result.unknowns)
             motion = replace(motion, parameters=self.parameter_guess())
-            settings = self.settings(loose or solver.tolerance, solver.first_barrier)
+            settings = self.settings(tolerance, solver.first_barrier)
         else:
-            warm_start = replace(warm_start, phases=warm_start.phases[: len(self.gait.phases)])
-            if not config.fits:
-                warm_start = with_goal_costs(warm_start, self.gait.costs, self.walker.weight)
-            kept = config.mesh.refinements > 0
-            motion = warm_start if kept else self._first_meshed(warm_start)
-            settings = self.settings(loose or solver.tolerance, solver.warm_barrier)
+            motion = self._warm_motion(warm_start)
+            settings = self.settings(tolerance, solver.warm_barrier)
         if not self._interrupted:
             program, result = self._on_first_mesh(motion, settings)
         program, result, errors = self._refine(program, result, settings.tolerance)
         return self._finish(program, result, errors, warm_start is not None)
 
+    def _warm_motion(self, motion: PhasedMotion) -> PhasedMotion:
+        """Return an earlier motion as a start of this problem."""
+        mesh = self.config.mesh
+        motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])
+        if not self.config.fits:
+            motion = with_goal_costs(motion, self.gait.costs, self.walker.weight)
+        if mesh.refinements > 0:
+            return motion
+        return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
+
     def restored(self, result: NlpResult, meshes: tuple[np.ndarray, ...]) -> GaitSolution:
         """Return the solution that another process found on these meshes."""
         program = CollocationProgram(self.blocks, self.prediction, meshes)
-        errors = self._reintegrated(program.to_motion(result.unknowns))
-        return self._finish(program, result, errors, False)
+        return self._finish(program, result, self._errors(program, result), False)
 
-    def _on_first_mesh(
-        self, motion: PhasedMotion, settings: IpoptSettings
-    ) -> tuple[CollocationProgram, NlpResult]:
+    def _on_first_mesh(self, motion: PhasedMotion, settings: IpoptSettings) -> Stage:
         """Predict on the first mesh; if that fails, by way of a motion that reserves help along."""
         helpless = self.config.fits
-        limit = settings.max_iterations if helpless else min(_PATIENCE, settings.max_iterations)
-        first = replace(settings, max_iterations=limit)
-        program, result = self.stage("first mesh", motion, self.prediction, first)
-        if result.converged or helpless or self._interrupted:
-            return program, result
-        return self._helped(motion, settings) or (program, result)
+        limit = min(choices.PATIENCE, settings.max_iterations)
+        short = settings if helpless else replace(settings, max_iterations=limit)
+        first = self.stage("first mesh", motion, self.prediction, short)
+        if first[1].converged or helpless or self._interrupted:
+            return first
+        return self._helped(motion, settings) or first
 
-    def _helped(
-        self, motion: PhasedMotion, settings: IpoptSettings
-    ) -> tuple[CollocationProgram, NlpResult] | None:
+    def _helped(self, motion: PhasedMotion, settings: IpoptSettings) -> Stage | None:
         """Predict from a motion with reserves at the joints; if that fails, find what is lacking.
 
         Returns None if not even reserves lead to a motion within the bounds.
         """
         table = helped_bounds(self.bounds)
-        program, result = self.stage("helped", motion, self.numbers(_HELPED, table), settings)
+        numbers = self.numbers(choices.HELPED, table)
+        program, result = self.stage("helped", motion, numbers, settings)
         if not result.converged:
             self.shortfall = None if self._interrupted else Shortfall(within_bounds=False)
             return None
@@ -289,37 +253,34 @@ class GaitSolver:
         last = self.stage("first mesh again", helped, self.prediction, settings)
         if last[1].converged or self._interrupted:
             return last
-        numbers = self.numbers(_LEAST_HELP, table)
+        numbers = self.numbers(choices.LEAST_HELP, table)
         program, result = self.stage("least help", helped, numbers, settings)
         if result.converged:
-            motion = program.to_motion(result.unknowns)
-            motion = full_stride(motion) if self.config.half_cycle else motion
+            motion = self.whole_stride(program, result)
             missing = missing_torques(gait_series(self.walker, motion))
             self.shortfall = Shortfall(within_bounds=True, missing=missing)
         return last
 
-    def _first_meshed(self, motion: PhasedMotion) -> PhasedMotion:
-        mesh = self.config.mesh
-        return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
+    def whole_stride(self, program: CollocationProgram, result: NlpResult) -> PhasedMotion:
+        """Return the motion of a whole stride, of half a cycle with its mirror image."""
+        motion = program.to_motion(result.unknowns)
+        return full_stride(motion) if self.config.half_cycle else motion
 
-    def _track(self) -> tuple[CollocationProgram, NlpResult]:
+    def _track(self) -> Stage:
         """Follow the stride of the start with reserve forces and given durations.
 
         The orthosis is faded out: its steep stops would fight a stride that ignores it.
         """
-        config, stride, unknowns = self.config, self.stride, self.walker.unknowns
-        shares = np.array([_FADED if unknown.faded else 1.0 for unknown in unknowns])
-        held = shares * self.parameter_guess()
-        names = [unknown.name for unknown in unknowns]
-        table = tracking_bounds(
-            self.bounds, stride.durations, dict(zip(names, held.tolist(), strict=True))
-        )
-        meshes = meshing.first(stride.durations[: len(self.gait.phases)], config.mesh)
+        mesh, stride, unknowns = self.config.mesh, self.stride, self.walker.unknowns
+        held = self.parameter_guess() * [choices.FADED if u.faded else 1.0 for u in unknowns]
+        table = tracking_bounds(self.bounds, stride.durations, self.by_name(held))
+        meshes = meshing.first(stride.durations[: len(self.gait.phases)], mesh)
         costs = len(self.gait.costs.integrals)
-        motion = stride.motion(self.walker, held, meshes, config.mesh.degree, costs)
-        settings = self.settings(_TRACKING_TOLERANCE, _TRACKING_BARRIER)
-        settings = replace(settings, extra={"barrier_tol_factor": 100.0, **settings.extra})
-        numbers = self.numbers(_TRACKING, table, _FADED)
+        motion = stride.motion(self.walker, held, meshes, mesh.degree, costs)
+        settings = self.settings(choices.TRACKING_TOLERANCE, choices.TRACKING_BARRIER)
+        early = {"barrier_tol_factor": choices.TRACKING_BARRIER_FACTOR, **settings.extra}
+        settings = replace(settings, extra=early)
+        numbers = self.numbers(choices.TRACKING, table, choices.FADED)
         return self.stage("tracking", motion, numbers, settings)
 
     @property
@@ -331,31 +292,24 @@ class GaitSolver:
     ) -> tuple[CollocationProgram, NlpResult, Reintegration]:
         """Refine the mesh until an independent integrator agrees."""
         mesh, solver = self.config.mesh, self.config.solver
-        tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
-        errors = self._reintegrated(program.to_motion(result.unknowns), _MESHING)
+        errors = self._errors(program, result, choices.MESHING_TOLERANCE)
         for attempt in range(1, mesh.refinements + 1):
-            done = _within(errors, tolerances) and tolerance <= solver.tolerance
+            done = _within(errors, mesh) and tolerance <= solver.tolerance
             if not result.converged or done or self._interrupted:
                 break
-            share = _EAGER_SHARE if attempt >= _EAGER_ROUND else 1.0
-            meshes = meshing.refined(program.meshes, errors, *tolerances, mesh.degree, share)
+            share = choices.EAGER_SHARE if attempt >= choices.EAGER_ROUND else 1.0
+            meshes = meshing.refined(program.meshes, errors, mesh, share)
             start = program.to_motion(result.unknowns).resampled(meshes, mesh.degree)
             name, before = f"refined {attempt}", (program, result)
             program, result = self._refined(name, start, before, tolerance)
             tolerance = solver.tolerance
-            errors = self._reintegrated(program.to_motion(result.unknowns), _MESHING)
-        return program, result, self._reintegrated(program.to_motion(result.unknowns))
+            errors = self._errors(program, result, choices.MESHING_TOLERANCE)
+        return program, result, self._errors(program, result)
 
-    def _refined(
-        self,
-        name: str,
-        start: PhasedMotion,
-        before: tuple[CollocationProgram, NlpResult],
-        tolerance: float,
-    ) -> tuple[CollocationProgram, NlpResult]:
+    def _refined(self, name: str, start: PhasedMotion, before: Stage, tolerance: float) -> Stage:
         """Solve on a refined mesh from the last solution; without multipliers if that fails."""
         solver = self.config.solver
-        barrier = max(_BARRIER_SHARE * tolerance, solver.refined_barrier)
+        barrier = max(choices.BARRIER_SHARE * tolerance, solver.refined_barrier)
         near = self.settings(solver.tolerance, barrier, warm=True)
         program, result = self.stage(name, start, self.prediction, near, before)
         if result.converged or self._interrupted:
@@ -363,28 +317,24 @@ class GaitSolver:
         far = self.settings(solver.tolerance, solver.warm_barrier)
         return self.stage(f"{name} again", start, self.prediction, far)
 
-    def _reintegrated(self, motion: PhasedMotion, tolerance: float = 1e-9) -> Reintegration:
+    def _errors(
+        self, program: CollocationProgram, result: NlpResult, tolerance: float = 1e-9
+    ) -> Reintegration:
+        """Return the errors of an independent integrator of this relative tolerance."""
         began = time.perf_counter()
-        errors = reintegrate(self.walker, motion, tolerance)
+        errors = reintegrate(self.walker, program.to_motion(result.unknowns), tolerance)
         self.seconds["verify"] += time.perf_counter() - began
         return errors
 
     def _finish(
-        self,
-        program: CollocationProgram,
-        result: NlpResult,
-        errors: Reintegration,
-        warm: bool,
+        self, program: CollocationProgram, result: NlpResult, errors: Reintegration, warm: bool
     ) -> GaitSolution:
-        mesh = self.config.mesh
-        status = result.status
-        tolerances = (mesh.position_tolerance, mesh.velocity_tolerance)
-        if result.converged and mesh.refinements and not _within(errors, tolerances):
+        mesh, status = self.config.mesh, result.status
+        if result.converged and mesh.refinements and not _within(errors, mesh):
             status = "the mesh does not reach the accuracy asked for"
         if self.shortfall is not None and self.shortfall.too_weak:
             status = TOO_WEAK
-        motion = program.to_motion(result.unknowns)
-        motion = full_stride(motion) if self.config.half_cycle else motion
+        motion = self.whole_stride(program, result)
         return GaitSolution(
             case=self.case,
             walker=self.walker.with_parameters(motion.parameters),
@@ -393,7 +343,7 @@ class GaitSolver:
             nlp=result,
             bounds=self.bounds,
             cost=result.objective,
-            cost_terms=cost_terms(motion, self.gait.costs, self.weights, self.samples),
+            cost_terms=cost_terms(motion, self.gait.costs, self.config.cost.weights, self.samples),
             violations=largest_violations(program, result),
             active=active_bounds(program, result),
             reintegration=errors,
@@ -404,8 +354,12 @@ class GaitSolver:
         )
 
 
-def _within(errors: Reintegration, tolerances: tuple[float, float]) -> bool:
-    return errors.worst_position <= tolerances[0] and errors.worst_velocity <= tolerances[1]
+def _within(errors: Reintegration, mesh: MeshConfig) -> bool:
+    """Return whether the errors on a mesh are those that a config allows."""
+    return (
+        errors.worst_position <= mesh.position_tolerance
+        and errors.worst_velocity <= mesh.velocity_tolerance
+    )
 
 
 def solve_study(

@@ -9,26 +9,17 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Final
 
 import numpy as np
 from scipy.stats import qmc
 
 from pathwalker_cli.case import Case
+from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.cost_terms import walked_distance
-from pathwalker_cli.gait.shortfall import Shortfall
-from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, StageRecord
+from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, Shortfall, StageRecord
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.processes import results_of_calls
 from pathwalker_cli.nlp.ipopt import NlpResult
-
-__all__ = ["solve_from_starts", "spread_starts"]
-
-_SPREAD: Final = {"knee_flexion": (0.35, 1.0), "stride_ratio": (0.8, 1.5)}
-"""Ranges of the stylised gaits: crouch [rad] and stride length [leg lengths]."""
-
-_FASTER: Final = (1.0, 1.6)
-"""Range of their speed, as a multiple of the study's own start."""
 
 Finished = Callable[[LocalOptimum], None]
 
@@ -46,17 +37,14 @@ class _Outcome:
 
 
 def spread_starts(solver: GaitSolver) -> list[Case]:
-    """Return a case for every start; equal seeds give equal starts.
-
-    Args:
-        solver: The solver of the study, whose `starts` says how many.
-    """
+    """Return a case for every start of a solver's study; equal seeds give equal starts."""
     config = solver.config
     single = config.model_copy(update={"starts": 1})
     unknowns = solver.walker.unknowns
     lower, upper = solver.bounds.table.arrays(tuple(unknown.name for unknown in unknowns))
-    low = [*(pair[0] for pair in _SPREAD.values()), _FASTER[0], *lower]
-    high = [*(pair[1] for pair in _SPREAD.values()), _FASTER[1], *upper]
+    spread = (choices.CROUCH_SPREAD, choices.STRIDE_SPREAD, choices.SPEED_SPREAD)
+    low = [*(pair[0] for pair in spread), *lower]
+    high = [*(pair[1] for pair in spread), *upper]
     cube = qmc.LatinHypercube(len(low), rng=np.random.default_rng(config.start.seed))
     points = qmc.scale(cube.random(config.starts - 1), low, high)
     studies = [single]
@@ -77,14 +65,10 @@ def spread_starts(solver: GaitSolver) -> list[Case]:
 
 
 def solve_from_starts(case: Case, finished: Finished | None = None) -> GaitSolution:
-    """Solve a study from all its starts, on as many processes as there are cores.
+    """Return the best solution from all starts of a study, with all local optima by cost.
 
-    Args:
-        case: The study.
-        finished: Called with every local optimum as soon as it is there.
-
-    Returns:
-        The best solution, with all local optima ordered by cost.
+    They run on as many processes as there are cores; `finished` is called with every local optimum
+    as soon as it is there.
     """
     solver = GaitSolver(case)
     outcomes = list(_outcomes(spread_starts(solver), finished))
@@ -120,10 +104,7 @@ def _solved(number: int, case: Case) -> _Outcome:
         stiffness=tuple(solution.walker.stiffness.tolist()),
         iterations=solution.iterations,
         seconds=float(sum(solution.seconds.values())),
-        numbers={
-            u.name: float(value)
-            for u, value in zip(solver.walker.unknowns, last.parameters, strict=True)
-        },
+        numbers=solver.by_name(last.parameters),
     )
     meshes = last.meshes[: len(solver.gait.phases)]
     return _Outcome(

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from pathwalker_cli.conventions import COORDINATES, coordinate_unit
+from pathwalker_cli.conventions import COORDINATES, GRAVITY, coordinate_unit
+from pathwalker_cli.gait import choices
+from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.trajectory import Trajectory
-
-__all__ = ["StylisedGait", "stylised_trajectory"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,15 @@ class StylisedGait:
     def durations(self) -> np.ndarray:
         """Phase durations [s], shape (8,)."""
         return np.tile(self.phase_shares, 2) * self.stride_time / 2
+
+
+def stylised_stride(
+    walker: Walker, walking_speed: float, knee_flexion: float, stride_ratio: float
+) -> ReferenceStride:
+    """Return a stylised stride; at least 0.1 sqrt(g leg length) fast."""
+    slowest = choices.SLOWEST * float(np.sqrt(GRAVITY * walker.leg_length))
+    gait = StylisedGait(max(walking_speed, slowest), stride_ratio * walker.leg_length, knee_flexion)
+    return ReferenceStride("synthetic", stylised_trajectory(walker, gait), gait.durations)
 
 
 @dataclass(frozen=True)
@@ -106,20 +115,21 @@ def stylised_trajectory(walker: Walker, gait: StylisedGait, samples: int = 201) 
     hip = np.column_stack(
         [pelvis_x - hip_drop * np.sin(gait.pelvis_tilt), np.full(samples, hip_height)]
     )
-    values = np.zeros((samples, len(COORDINATES)))
-    values[:, 0] = pelvis_x
-    values[:, 1] = hip_height + hip_drop * np.cos(gait.pelvis_tilt)
-    values[:, 2] = gait.pelvis_tilt
-    values[:, -1] = gait.trunk_lean
+    q: dict[str, np.ndarray | float] = {
+        "pelvis_tx": pelvis_x,
+        "pelvis_tz": hip_height + hip_drop * np.cos(gait.pelvis_tilt),
+        "pelvis_tilt": gait.pelvis_tilt,
+        "lumbar": gait.trunk_lean,
+    }
     for side, delay in (("r", 0.0), ("l", gait.stride_time / 2)):
         plant = hip[0, 0] + gait.walking_speed * (mid_right + delay)
         plant -= gait.setback * (legs[side].thigh + legs[side].shank)
         ankle, pitch = _foot_path(legs[side], gait, time - delay, plant)
         thigh, knee = legs[side].angles(hip, ankle)
-        column = COORDINATES.index(f"hip_{side}")
-        values[:, column] = thigh - gait.pelvis_tilt
-        values[:, column + 1] = knee
-        values[:, column + 2] = pitch - thigh - knee
+        q[f"hip_{side}"] = thigh - gait.pelvis_tilt
+        q[f"knee_{side}"] = knee
+        q[f"ankle_{side}"] = pitch - thigh - knee
+    values = np.column_stack([np.broadcast_to(q[name], samples) for name in COORDINATES])
     units = tuple(coordinate_unit(name) for name in COORDINATES)
     return Trajectory(time, COORDINATES, values, units)
 
@@ -138,12 +148,12 @@ def _leg(walker: Walker, side: str) -> _Leg:
 
 def _hip_height(legs: dict[str, _Leg], gait: StylisedGait) -> float:
     """Return the hip height at which the longer leg stands flat with the wanted knee flexion."""
-    heights = []
-    for leg in legs.values():
-        reach = np.sqrt(
-            leg.thigh**2 + leg.shank**2 + 2 * leg.thigh * leg.shank * np.cos(gait.knee_flexion)
-        )
-        heights.append(reach - _turn(leg.toe, np.array([leg.flat_pitch]))[0, 1])
+    bend = np.cos(gait.knee_flexion)
+    heights = [
+        np.sqrt(leg.thigh**2 + leg.shank**2 + 2 * leg.thigh * leg.shank * bend)
+        - _turn(leg.toe, np.array([leg.flat_pitch]))[0, 1]
+        for leg in legs.values()
+    ]
     return float(np.mean(heights))
 
 

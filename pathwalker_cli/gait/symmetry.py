@@ -2,44 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, mirror_permutation, mirrored
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.cost_terms import walked_distance
-from pathwalker_cli.gait.problem import (
-    ACCELERATIONS,
-    ACTIVATIONS,
-    RATES,
-    RESERVES,
-    VELOCITIES,
-)
+from pathwalker_cli.gait.problem import ACCELERATIONS, RESERVES, VELOCITIES
 from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
-__all__ = ["asymmetries", "full_stride", "require_symmetry"]
-
 
 def asymmetries(walker: Walker) -> list[str]:
     """Return in words what differs between the sides of a walker."""
-    order = mirror_permutation(GENERATORS)
-    strengths = walker.max_isometric_torque
-    zero = walker.contact_points(np.zeros(len(COORDINATES)))
+    model, strengths = walker.model, walker.max_isometric_torque
+    order = mirror_permutation(COORDINATES)
+    right, left = np.split(walker.contact_points(np.zeros(len(COORDINATES))), 2)
     q = np.linspace(-0.3, 0.6, len(COORDINATES))
-    swapped = q[mirror_permutation(COORDINATES)]
-    bias, mirrored_bias = (pin.nonLinearEffects(walker.model, walker.model.createData(), k, k)
-                           for k in (q, swapped))  # fmt: skip
-    differing = {
-        "strengths": not np.allclose(strengths, strengths[order]),
-        "contact points": not np.allclose(zero[:2], zero[2:]),
-        "masses or lengths": not np.allclose(
-            bias, mirrored_bias[mirror_permutation(COORDINATES)], rtol=1e-9, atol=1e-9
-        ),
-        "orthoses": walker.orthosis is not None and walker.orthosis[0] != walker.orthosis[1],
+    bias, swapped = (pin.nonLinearEffects(model, model.createData(), k, k) for k in (q, q[order]))
+    alike = {
+        "strengths": np.allclose(strengths, strengths[mirror_permutation(GENERATORS)]),
+        "contact points": np.allclose(right, left),
+        "masses or lengths": np.allclose(bias, swapped[order], rtol=1e-9, atol=1e-9),
+        "orthoses": walker.orthosis is None or walker.orthosis[0] == walker.orthosis[1],
     }
-    return [name for name, differs in differing.items() if differs]
+    return [name for name, same in alike.items() if not same]
 
 
 def require_symmetry(walker: Walker) -> None:
@@ -81,21 +71,19 @@ def full_stride(step: PhasedMotion) -> PhasedMotion:
 def _mirrored(phase: PhaseMotion, i: int, length: float, costs: np.ndarray) -> PhaseMotion:
     """Return a phase with left and right exchanged, one step on."""
     here, there = PHASES[i], PHASES[i + len(PHASES) // 2]
-    state_order = mirror_permutation(COORDINATES + VELOCITIES)
+    order, muscles = mirror_permutation(COORDINATES + VELOCITIES), mirror_permutation(GENERATORS)
     names = ACCELERATIONS + here.force_names + RESERVES
     wanted = ACCELERATIONS + there.force_names + RESERVES
-    algebraic_order = [names.index(mirrored(name)) for name in wanted]
-    states, inner = phase.states[:, state_order], phase.inner_states[..., state_order]
-    states[:, 0] += length
-    inner[..., 0] += length
-    return PhaseMotion(
+    states, inner = phase.states[:, order], phase.inner_states[..., order]
+    for values in (states, inner):
+        values[..., COORDINATES.index("pelvis_tx")] += length
+    return replace(
+        phase,
         name=there.name,
-        duration=phase.duration,
-        mesh=phase.mesh,
         states=states,
-        smooth=phase.smooth[:, mirror_permutation(ACTIVATIONS)],
-        controls=phase.controls[:, mirror_permutation(RATES)],
+        smooth=phase.smooth[:, muscles],
+        controls=phase.controls[:, muscles],
         integrals=phase.integrals + costs,
         inner_states=inner,
-        algebraic=phase.algebraic[..., algebraic_order],
+        algebraic=phase.algebraic[..., [names.index(mirrored(name)) for name in wanted]],
     )

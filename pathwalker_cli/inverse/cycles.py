@@ -14,23 +14,6 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.c3d import Event, EventKind
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = [
-    "OTHER",
-    "POINTS",
-    "CycleBand",
-    "GaitCycle",
-    "Stance",
-    "cycle_band",
-    "gait_cycles",
-    "joint_ranges",
-    "resampled",
-    "single_support",
-    "stances",
-    "step_lengths",
-    "swings",
-    "walking_speed",
-]
-
 OTHER: Final[Mapping[Side, Side]] = {"right": "left", "left": "right"}
 
 POINTS: Final = 101

@@ -13,16 +13,6 @@ from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, force_unit
 from pathwalker_cli.io.recordings import foot_columns
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = [
-    "FORCE_CUTOFF",
-    "MOTION_CUTOFF",
-    "frame_rate",
-    "generalised_forces",
-    "inverse_dynamics",
-    "low_pass",
-    "smooth_rates",
-]
-
 MOTION_CUTOFF: Final = 6.0
 """Cut-off of joint angles [Hz]; usual for walking (Winter 2009, section 3.4)."""
 

@@ -39,16 +39,6 @@ from pathwalker_cli.stride.figures.style import (
 )
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = [
-    "ground_force_figure",
-    "joint_angle_figure",
-    "joint_torque_figure",
-    "marker_figure",
-    "name_figure",
-    "recorded_reference",
-    "save_recorded_figures",
-]
-
 _RANGE: Final = "#9ecae1"
 """Light blue of a range that belongs to no side."""
 

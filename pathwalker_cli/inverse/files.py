@@ -22,15 +22,6 @@ from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import Strengths
 from pathwalker_cli.versions import today, versions
 
-__all__ = [
-    "ORIGIN",
-    "strengths_source",
-    "write_dynamics",
-    "write_kinematics",
-    "write_strengths_yaml",
-    "write_trial",
-]
-
 ORIGIN: Final = "study.json"
 """File that says whose recorded gait was studied, how and when."""
 

@@ -30,18 +30,6 @@ from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
 from pathwalker_cli.io.recordings import FORCE_COLUMNS
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = [
-    "GroundForces",
-    "PlateLoad",
-    "centre_of_pressure",
-    "foot_extents",
-    "foot_points",
-    "force_columns",
-    "ground_forces",
-    "plate_direction",
-    "plate_load",
-]
-
 _FAR: Final = 0.2
 """Distance beyond which it does not matter how far a load lies from a foot [m]."""
 

@@ -14,8 +14,6 @@ from pathwalker_cli.inverse.markers import MarkerPoint, WalkingPlane, walking_pl
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["MarkerResiduals", "inverse_kinematics", "marker_paths", "pelvis_markers"]
-
 TOLERANCE: Final = 1e-8
 """Largest step at which a frame counts as solved [m, rad]: far below what markers resolve."""
 

@@ -19,19 +19,6 @@ from pathwalker_cli.model.anthropometry import segments
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import Patient
 
-__all__ = [
-    "LONGEST_GAP",
-    "Gap",
-    "MarkerPoint",
-    "MarkerSet",
-    "WalkingPlane",
-    "bridge_gaps",
-    "is_projected",
-    "load_marker_set",
-    "marker_points",
-    "walking_plane",
-]
-
 Offset = Annotated[float, Quantity("m", -1.0, 1.0, *["is it in millimetres?"] * 2)]
 
 LONGEST_GAP: Final = 0.1

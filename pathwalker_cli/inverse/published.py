@@ -25,17 +25,6 @@ from pathwalker_cli.inverse.markers import WalkingPlane
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = [
-    "AVERAGED_TRIALS",
-    "EVENT_SHIFT",
-    "TURNED",
-    "flagged_cycles",
-    "forward_difference",
-    "published_filter",
-    "published_torques",
-    "wrench_axis_at_ground",
-]
-
 AVERAGED_TRIALS: Final = {
     "barefoot": ("3053176", "3053178", "3053179", "3053183", "3053184"),
     "orthosis": ("3053141", "3053142", "3053144", "3053146"),

@@ -23,16 +23,6 @@ from pathwalker_cli.patient import Patient, shipped_patients
 from pathwalker_cli.patient.blocks import Recorded, Strengths
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = [
-    "recorded",
-    "recorded_blocks",
-    "require_own_patient",
-    "strength_lines",
-    "trial_steps",
-    "update_patient",
-    "with_block",
-]
-
 
 def recorded(
     patient: Patient, condition: Condition, trials: Sequence[CompactRecording]

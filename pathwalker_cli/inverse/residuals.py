@@ -15,19 +15,6 @@ from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.inverse.trials import Trial
 from pathwalker_cli.patient import Patient
 
-__all__ = [
-    "COMPONENTS",
-    "Part",
-    "ResidualRange",
-    "ResidualTable",
-    "Residuals",
-    "residual_range",
-    "residual_tables",
-    "residuals",
-    "study_warnings",
-    "trial_residuals",
-]
-
 COMPONENTS: Final[Mapping[str, str]] = {"forward": "N", "up": "N", "moment": "N m"}
 """Components of a residual in order, those of `ROOT`, with their units."""
 

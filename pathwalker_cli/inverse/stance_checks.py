@@ -17,8 +17,6 @@ from pathwalker_cli.conventions import Side
 from pathwalker_cli.inverse.cycles import OTHER, Stance, single_support
 from pathwalker_cli.io.c3d import Event
 
-__all__ = ["LOADED", "Evidence", "StanceForce", "judge", "outside"]
-
 LOADED: Final = 20.0
 """Vertical force from which a plate counts as loaded [N]; about ten times its noise."""
 

@@ -31,18 +31,6 @@ from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, curves_o
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import Strengths
 
-__all__ = [
-    "ACTIVATION_AT_PEAK",
-    "Peak",
-    "StrengthRow",
-    "StrengthTable",
-    "extension_peaks",
-    "isometric_torque",
-    "stance_curves",
-    "strength_table",
-    "strengths_of",
-]
-
 ACTIVATION_AT_PEAK: Final = 0.9
 """Activation at the peak of the torque, article, section 2.2.1."""
 

@@ -16,15 +16,6 @@ from pathwalker_cli.inverse.dynamics import MOTION_CUTOFF
 from pathwalker_cli.inverse.markers import LONGEST_GAP
 from pathwalker_cli.io.fields import Quantity, YamlModel, invalid
 
-__all__ = [
-    "InverseDynamicsConfig",
-    "InverseKinematicsConfig",
-    "Paths",
-    "RecordedConfig",
-    "load_inverse_dynamics",
-    "load_inverse_kinematics",
-]
-
 Config = TypeVar("Config", bound="RecordedConfig")
 
 

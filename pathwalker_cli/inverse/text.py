@@ -15,15 +15,6 @@ from pathwalker_cli.inverse.residuals import COMPONENTS, ResidualTable
 from pathwalker_cli.inverse.strengths import StrengthTable
 from pathwalker_cli.inverse.trials import Trial
 
-__all__ = [
-    "dynamics_content",
-    "residuals_renderable",
-    "stance_notes",
-    "strengths_renderable",
-    "trial_warnings",
-    "trials_renderable",
-]
-
 
 def trials_renderable(trials: Iterable[Trial]) -> Table:
     """Return one row per trial: length, cycles, measured stances, distance of the markers."""

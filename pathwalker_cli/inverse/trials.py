@@ -47,19 +47,6 @@ from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = [
-    "Progress",
-    "Trial",
-    "c3d_trial",
-    "dynamics_trials",
-    "kinematics_trials",
-    "read_trials",
-    "recorded_stances",
-    "recorded_trials",
-    "require_trials",
-    "with_torques",
-]
-
 Progress = Callable[[str], None]
 """Called with "barefoot 3053179" before a trial is evaluated."""
 

@@ -15,19 +15,6 @@ from typing import IO, Any, Final, Literal
 
 from pathwalker_cli.errors import DataError, InputError
 
-__all__ = [
-    "atomic_open",
-    "atomic_path",
-    "check_output",
-    "check_room",
-    "output_path",
-    "refuse_special",
-    "staged_folder",
-    "swapped",
-    "sweep",
-    "write_text",
-]
-
 _LEAST_ROOM: Final = 10_000_000
 """Free bytes of a disk below which nothing long is begun; a run takes some 2 MB."""
 _TEMPORARY: Final = re.compile(r"\..+\.\w{8}\.tmp")

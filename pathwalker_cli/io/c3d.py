@@ -17,17 +17,6 @@ import numpy as np
 from pathwalker_cli.conventions import Side
 from pathwalker_cli.errors import DataError
 
-__all__ = [
-    "LEAST_FRAMES",
-    "METRES",
-    "Event",
-    "EventKind",
-    "ForcePlate",
-    "Recording",
-    "analog_offset_error",
-    "read_c3d",
-]
-
 EventKind = Literal["foot_strike", "toe_off"]
 
 LEAST_FRAMES: Final = 20

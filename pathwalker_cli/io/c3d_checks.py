@@ -13,8 +13,6 @@ import numpy as np
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.c3d import LEAST_FRAMES, Recording, read_c3d
 
-__all__ = ["c3d_files", "checked_recording", "require_plates"]
-
 LEAST_RATE: Final = 50.0
 """Frames per second below which foot strikes blur [1/s]; the plates' 20 Hz filter needs 40."""
 

@@ -10,8 +10,6 @@ import numpy as np
 
 from pathwalker_cli.io.c3d import METRES, Event, EventKind, ForcePlate, Recording
 
-__all__ = ["write_c3d"]
-
 _LABELS: Final[dict[EventKind, str]] = {"foot_strike": "Foot Strike", "toe_off": "Foot Off"}
 
 _KISTLER: Final = 3

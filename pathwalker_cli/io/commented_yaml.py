@@ -9,8 +9,6 @@ from pathlib import Path
 
 import yaml
 
-__all__ = ["Entry", "entries", "reasons"]
-
 
 @dataclass(frozen=True)
 class Entry:

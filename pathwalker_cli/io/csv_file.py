@@ -11,8 +11,6 @@ from typing import Any
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open
 
-__all__ = ["as_text", "number", "read_cells", "read_rows", "write_table"]
-
 
 def write_table(path: str | Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
     """Write a table in one stroke; None becomes an empty cell."""

@@ -12,19 +12,6 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, GetCoreSchemaHandle
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-__all__ = [
-    "AS_TUPLE",
-    "Quantity",
-    "Sides",
-    "YamlModel",
-    "described",
-    "field_at",
-    "invalid",
-    "is_model",
-    "quantity_at",
-    "side_type",
-]
-
 T = TypeVar("T")
 
 _LARGEST: Final = sys.float_info.max

@@ -10,8 +10,6 @@ from typing import Any, Final, NoReturn
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open, refuse_special
 
-__all__ = ["json_text", "read_json", "write_json"]
-
 _MOST_DIGITS: Final = 300
 """Digits of a whole number that still is a float."""
 

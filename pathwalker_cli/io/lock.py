@@ -12,8 +12,6 @@ from filelock import FileLock, Timeout
 
 from pathwalker_cli.errors import DataError
 
-__all__ = ["locked"]
-
 _NO_LOCKS: Final = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 """What disks say that know no locks: there, nobody can be kept out."""
 

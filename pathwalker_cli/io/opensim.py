@@ -16,8 +16,6 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["force_table", "read_opensim", "torque_table", "write_opensim"]
-
 _END: Final = "endheader"
 
 

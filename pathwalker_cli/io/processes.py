@@ -18,8 +18,6 @@ from pebble import ProcessExpired, ProcessPool
 
 from pathwalker_cli.errors import NotConvergedError
 
-__all__ = ["ended_calls", "prepare_worker", "results_of_calls"]
-
 LOST: Final = (
     "a process was ended from outside (out of memory?); call again, with fewer processes if need be"
 )

@@ -22,18 +22,6 @@ from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = [
-    "FORCE_COLUMNS",
-    "CompactRecording",
-    "foot_columns",
-    "names_in",
-    "read_compact",
-    "read_recording",
-    "recording_names",
-    "start_names",
-    "write_recording",
-]
-
 
 def foot_columns(side: Side) -> tuple[str, str, str]:
     """Return the columns about one foot: force forward and up, centre of pressure forward."""

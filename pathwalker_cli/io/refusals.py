@@ -9,8 +9,6 @@ from pydantic import BaseModel, ValidationError
 
 from pathwalker_cli.errors import InputError, did_you_mean
 
-__all__ = ["KeyPath", "Lines", "allowed_keys", "dotted", "place", "sentence"]
-
 KeyPath = tuple[str | int, ...]
 Lines = Mapping[KeyPath, int | str]
 """Line number (from 1) of every key of a file, or the override that stands in its place."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-__all__ = ["templates"]
-
 
 def templates(package: str, folder: str = "templates", *, escape: bool = True) -> Environment:
     """Return the templates of a package; undefined names are errors.

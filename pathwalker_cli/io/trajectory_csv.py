@@ -13,8 +13,6 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.csv_file import as_text, read_cells, write_table
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["read_trajectory", "write_trajectory"]
-
 _HEADER: Final = re.compile(r"^\s*(?P<name>\w+)\s*\[(?P<unit>[^\]]*)\]\s*$")
 
 

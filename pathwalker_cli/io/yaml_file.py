@@ -16,17 +16,6 @@ from pathwalker_cli.errors import ConfigError, InputError
 from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.io.refusals import KeyPath, Lines, dotted, place, sentence
 
-__all__ = [
-    "KeyPath",
-    "Lines",
-    "load_yaml",
-    "mapping_in",
-    "read_mapping",
-    "read_text",
-    "validate",
-    "yaml_text",
-]
-
 Model = TypeVar("Model", bound=BaseModel)
 
 

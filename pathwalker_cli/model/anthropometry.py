@@ -17,8 +17,6 @@ from pathwalker_cli.model.devices import DEVICES
 if TYPE_CHECKING:
     from pathwalker_cli.patient import Patient
 
-__all__ = ["JENSEN", "Line", "Regression", "Segment", "segments", "total_mass"]
-
 Vector = tuple[float, float, float]
 
 
@@ -137,21 +135,13 @@ def segments(
         segment: mass(number.address, patient.number(number.address))
         for segment, number in DEVICES[condition].added_mass.items()
     }
-    axial = (
-        _segment(patient, "pelvis", -1, parent="", origin=(0.0, 0.0, 0.0)),
-        _segment(
-            patient, "trunk", 1, "pelvis", (0.0, 0.0, patient.length("lumbar_height")), "lumbar"
-        ),
-        _segment(patient, "head", 1, "trunk", (0.0, 0.0, patient.length("trunk"))),
+    return (
+        _segment(patient, "pelvis", "", 0.0),
+        *(s for side in SIDES for s in _leg(patient, side, added)),
+        _segment(patient, "trunk", "pelvis", patient.length("lumbar_height"), "lumbar"),
+        _segment(patient, "head", "trunk", patient.length("trunk")),
+        *(s for side in SIDES for s in _arm(patient, side, published and side == "right")),
     )
-    legs = tuple(s for side in SIDES for s in _leg(patient, side, added))
-    arms = tuple(s for side in SIDES for s in _arm(patient, side, published and side == "right"))
-    return (axial[0], *legs, *axial[1:], *arms)
-
-
-def total_mass(parts: tuple[Segment, ...]) -> float:
-    """Return the mass of all segments together [kg]."""
-    return sum(part.mass for part in parts)
 
 
 def _leg(patient: Patient, side: str, added: Mapping[str, float]) -> tuple[Segment, ...]:
@@ -163,16 +153,7 @@ def _leg(patient: Patient, side: str, added: Mapping[str, float]) -> tuple[Segme
         ("foot", f"shank_{suffix}", "ankle", patient.length("shank", side)),
     )
     return tuple(
-        _segment(
-            patient,
-            name,
-            -1,
-            parent,
-            (0.0, 0.0, -drop),
-            f"{joint}_{suffix}",
-            side,
-            added.get(name, 0.0),
-        )
+        _segment(patient, name, parent, -drop, f"{joint}_{suffix}", side, added.get(name, 0.0))
         for name, parent, joint, drop in chain
     )
 
@@ -186,37 +167,37 @@ def _arm(patient: Patient, side: str, misplaced: bool) -> tuple[Segment, ...]:
         ("lower_arm", f"upper_arm_{suffix}", -patient.length(elbow, side)),
         ("hand", f"lower_arm_{suffix}", -patient.length(wrist, side)),
     )
-    return tuple(
-        _segment(patient, name, -1, parent, (0.0, 0.0, z), side=side) for name, parent, z in chain
-    )
+    return tuple(_segment(patient, name, parent, z, side=side) for name, parent, z in chain)
 
 
 def _segment(
     patient: Patient,
     name: str,
-    direction: int,
     parent: str,
-    origin: Vector,
+    height: float,
     joint: str = "",
     side: str | None = None,
     added_mass: float = 0.0,
 ) -> Segment:
-    """Return one segment that extends up (1) or down (-1) from its origin, the foot forward."""
+    """Return one segment from its height above its parent's origin [m] on.
+
+    Trunk and head extend upward, the foot forward, all others downward.
+    """
     regression = JENSEN["trunk" if name in TRUNK_SHARE else name]
     age = patient.regression_age
     length = patient.length(name, side)
     body = patient.body_mass * regression.mass.at(age) * TRUNK_SHARE.get(name, 1.0)
     com, gyration = regression.com.at(age), regression.gyration.at(age)
     across = body * length**2 * (gyration**2 - com**2) * (body + added_mass) / body
-    offset = com * length
+    offset = com * length if name in ("trunk", "head", "foot") else -com * length
     return Segment(
         name=f"{name}_{SUFFIX[side]}" if side else name,
         parent=parent,
         joint=joint,
-        origin=origin,
+        origin=(0.0, 0.0, height),
         length=length,
         mass=body + added_mass,
-        com=(offset, 0.0, 0.0) if name == "foot" else (0.0, 0.0, direction * offset),
+        com=(offset, 0.0, 0.0) if name == "foot" else (0.0, 0.0, offset),
         inertia=_inertia(name, across),
     )
 

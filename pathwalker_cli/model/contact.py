@@ -5,25 +5,12 @@ Phases, in order, follow Sreenivasa et al. (2017), section 2.3: one right and on
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal
 
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.skeleton import SIDES, SUFFIX, Side
-
-__all__ = [
-    "FORCES",
-    "PHASES",
-    "PHASE_NAMES",
-    "POINTS",
-    "ContactForce",
-    "ContactPhase",
-    "ContactPoint",
-    "phase_named",
-    "sides_of",
-]
 
 
 @dataclass(frozen=True)
@@ -71,18 +58,17 @@ class ContactForce:
         """Whether it is the vertical component."""
         return self.axis == "z"
 
+    @property
+    def index(self) -> int:
+        """Its position in `FORCES`."""
+        return FORCES.index(self)
+
 
 POINTS: Final = tuple(ContactPoint(place, side) for side in SIDES for place in ("heel", "toe"))
 """All contact points in order."""
 
 FORCES: Final = tuple(ContactForce(point, axis) for point in POINTS for axis in ("x", "z"))
 """All components of the ground reaction forces (on the body) in order [N]."""
-
-
-def sides_of(points: Iterable[ContactPoint]) -> tuple[Side, ...]:
-    """Return the feet that points belong to."""
-    there = {point.side for point in points}
-    return tuple(side for side in SIDES if side in there)
 
 
 @dataclass(frozen=True)
@@ -110,12 +96,13 @@ class ContactPhase:
     @property
     def feet(self) -> tuple[Side, ...]:
         """Feet on the ground."""
-        return sides_of(self.points)
+        standing = {point.side for point in self.points}
+        return tuple(side for side in SIDES if side in standing)
 
     @cached_property
     def indices(self) -> tuple[int, ...]:
         """Positions of the active components in `FORCES`."""
-        return tuple(FORCES.index(force) for force in self.forces)
+        return tuple(force.index for force in self.forces)
 
     def touched_down(self, following: ContactPhase) -> tuple[ContactForce, ...]:
         """Return the directions in which new points are stopped when the next phase begins."""

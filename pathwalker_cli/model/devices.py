@@ -11,17 +11,15 @@ from pathwalker_cli.model.elements.orthosis import AnkleOrthosis
 from pathwalker_cli.model.numbers import Number
 from pathwalker_cli.model.skeleton import SIDES, Side
 
-__all__ = ["DEVICES", "Device"]
-
 
 @dataclass(frozen=True)
 class Device:
-    """What is worn on both feet.
+    """What a patient wears on both feet.
 
     Args:
         elements: Force elements that it adds, one per side.
         added_mass: What it adds to a segment of each leg [kg], by the segment.
-        identified: Names of the numbers that a prediction with it looks for unless told otherwise.
+        identified: Names of the numbers that a prediction with it looks for by itself.
     """
 
     elements: Mapping[Side, AnkleOrthosis] = field(default_factory=dict)

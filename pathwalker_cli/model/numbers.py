@@ -10,18 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
 from pathwalker_cli.errors import ConfigError, did_you_mean
+from pathwalker_cli.model.choices import UNIT_SIZES
 from pathwalker_cli.model.skeleton import SIDES, Side
-
-__all__ = ["Number", "Unknown", "unknowns_at", "with_unknowns"]
-
-_SIZES: Final = {"N m/rad": 50.0, "N m": 10.0, "rad": 0.1, "kg": 1.0, "m": 0.1}
-"""What counts as 1 for the solver, by unit; for stiffnesses prototypes needed the fewest
-iterations with this, the others are of the size of the numbers themselves."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +77,7 @@ class Unknown:
         first, alone = numbers[0], len(numbers) == 1
         label = f"{first.label} {first.side}" if alone and first.side else first.label
         name = first.full_name if alone else first.name
-        return cls(name, label, numbers, _SIZES[first.unit])
+        return cls(name, label, numbers, UNIT_SIZES[first.unit])
 
     @property
     def unit(self) -> str:
@@ -148,23 +142,3 @@ def unknowns_at(addresses: Iterable[str], numbers: Sequence[Number]) -> tuple[Un
         taken.update(unknown.addresses)
         chosen.append(unknown)
     return tuple(chosen)
-
-
-def with_unknowns(
-    values: Mapping[str, float],
-    unknowns: Sequence[Unknown],
-    parameters: Sequence[float] | np.ndarray,
-) -> dict[str, float]:
-    """Return numbers by address with those that unknowns set replaced.
-
-    Args:
-        values: Value by address [SI].
-        unknowns: The unknowns.
-        parameters: Their values in order [SI].
-    """
-    chosen = {
-        address: float(value)
-        for unknown, value in zip(unknowns, parameters, strict=True)
-        for address in unknown.addresses
-    }
-    return {**values, **chosen}

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal
 
-__all__ = ["PLANAR_WALKER", "SIDES", "SUFFIX", "Joint", "Side", "Skeleton"]
-
 Side = Literal["right", "left"]
 SIDES: Final[tuple[Side, Side]] = ("right", "left")
 SUFFIX: Final[dict[str, str]] = {"right": "r", "left": "l"}

@@ -6,7 +6,7 @@ those of the skeleton.  Heels and toes are links without mass; trunk, head and a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -17,8 +17,6 @@ from pathwalker_cli.model.anthropometry import Segment, Vector, segments
 from pathwalker_cli.model.contact import POINTS
 from pathwalker_cli.model.skeleton import PLANAR_WALKER, Joint
 from pathwalker_cli.patient import Patient
-
-__all__ = ["pinocchio_model", "urdf_text"]
 
 _LIMITS: Final = '<limit lower="{0}" upper="{1}" effort="1000" velocity="100"/>'
 _ANGLES: Final = _LIMITS.format(-3.2, 3.2)
@@ -42,7 +40,6 @@ def urdf_text(
         published: Reproduce the published model's misplaced right lower arm and hand.
         values: Masses of the device by address [kg], if not those of the patient's file.
     """
-    parts = segments(patient, condition, published, values)
     lines = [
         '<?xml version="1.0"?>',
         "<!-- Sagittal walker: x forward, z up, rotations about +y; m, kg, kg m^2, rad.",
@@ -51,7 +48,7 @@ def urdf_text(
         '  <link name="world"/>',
         *_root(),
     ]
-    for part in parts:
+    for part in segments(patient, condition, published, values):
         lines += _link(part)
         if part.parent:
             lines += _joint(part.joint, part.parent, part.name, part.origin)
@@ -68,37 +65,25 @@ def pinocchio_model(
     published: bool = False,
     values: Mapping[str, float] | None = None,
 ) -> pin.Model:
-    """Return the walker's Pinocchio model; its q is that of the skeleton.
-
-    Args:
-        patient: The patient.
-        condition: "barefoot" or "orthosis".
-        published: Reproduce the published model's misplaced right lower arm and hand.
-        values: Masses of the device by address [kg], if not those of the patient's file.
-    """
+    """Return the walker's Pinocchio model; arguments as of `urdf_text`; q as in the skeleton."""
     model = _ordered(pin.buildModelFromXML(urdf_text(patient, condition, published, values)))
     model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
     return model
 
 
-def _number(value: float) -> str:
-    """Return a number with nine digits, without noise of the last bits."""
-    return f"{value:.9g}" if value else "0"
-
-
-def _vector(values: Vector) -> str:
-    """Return three numbers as URDF text."""
-    return " ".join(_number(value) for value in values)
+def _numbers(values: Iterable[float]) -> str:
+    """Return numbers with nine digits, without noise of the last bits."""
+    return " ".join(f"{value:.9g}" if value else "0" for value in values)
 
 
 def _link(part: Segment) -> list[str]:
     """Return the lines of a link with its inertia about its centre of mass."""
-    xx, yy, zz = (_number(value) for value in part.inertia)
+    xx, yy, zz = _numbers(part.inertia).split()
     return [
         f'  <link name="{part.name}">',
         "    <inertial>",
-        f'      <origin xyz="{_vector(part.com)}"/>',
-        f'      <mass value="{_number(part.mass)}"/>',
+        f'      <origin xyz="{_numbers(part.com)}"/>',
+        f'      <mass value="{_numbers([part.mass])}"/>',
         f'      <inertia ixx="{xx}" ixy="0" ixz="0" iyy="{yy}" iyz="0" izz="{zz}"/>',
         "    </inertial>",
         "  </link>",
@@ -112,7 +97,7 @@ def _joint(name: str, parent: str, child: str, origin: Vector) -> list[str]:
         f"  <joint {head}>",
         f'    <parent link="{parent}"/>',
         f'    <child link="{child}"/>',
-        f'    <origin xyz="{_vector(origin)}"/>',
+        f'    <origin xyz="{_numbers(origin)}"/>',
     ]
     if name:
         lines += ['    <axis xyz="0 1 0"/>', f"    {_ANGLES}"]
@@ -147,23 +132,12 @@ def _ordered(parsed: pin.Model) -> pin.Model:
     new_index = {0: 0}
     for name in PLANAR_WALKER.coordinates:
         old = parsed.getJointId(name)
-        parent = new_index[parsed.parents[old]]
-        placement = parsed.jointPlacements[old]
-        index = model.addJoint(parent, parsed.joints[old], placement, name)
-        model.appendBodyToJoint(index, parsed.inertias[old], pin.SE3.Identity())
-        new_index[old] = index
+        parent, placement = new_index[parsed.parents[old]], parsed.jointPlacements[old]
+        new_index[old] = model.addJoint(parent, parsed.joints[old], placement, name)
+        model.appendBodyToJoint(new_index[old], parsed.inertias[old], pin.SE3.Identity())
     frame_index = {0: 0}
-    for old, frame in enumerate(parsed.frames):
-        if old == 0:
-            continue
-        frame_index[old] = model.addFrame(
-            pin.Frame(
-                frame.name,
-                new_index[frame.parentJoint],
-                frame_index[frame.parentFrame],
-                frame.placement,
-                frame.type,
-            ),
-            False,
-        )
+    for old, frame in enumerate(parsed.frames[1:], 1):
+        joint, above = new_index[frame.parentJoint], frame_index[frame.parentFrame]
+        moved = pin.Frame(frame.name, joint, above, frame.placement, frame.type)
+        frame_index[old] = model.addFrame(moved, False)
     return model

@@ -13,18 +13,17 @@ import pinocchio as pin
 
 from pathwalker_cli.conventions import CONDITIONS, CONTACT_FORCES, CONTACT_POINTS, SIDES, Condition
 from pathwalker_cli.errors import InputError
-from pathwalker_cli.model.backends import RigidBodyFunctions, rigid_body_functions
+from pathwalker_cli.model.backends import rigid_body_functions
+from pathwalker_cli.model.backends.functions import RigidBodyFunctions
 from pathwalker_cli.model.contact import ContactPhase, phase_named
 from pathwalker_cli.model.devices import DEVICES, Device
 from pathwalker_cli.model.elements import ForceElement, State, element_forces, generalised_forces
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
 from pathwalker_cli.model.elements.orthosis import OrthosisSide
-from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at, with_unknowns
+from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at
 from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
-
-__all__ = ["Walker", "build_walker", "unknowns_of"]
 
 _MUSCLES: Final = generators()
 _TISSUE: Final[tuple[ForceElement, ...]] = ()
@@ -43,7 +42,7 @@ class Walker:
         rigid_body: The same as CasADi functions.
         muscles: The muscle torque generators.
         tissue: Force elements of the body beside the muscles.
-        device: What is worn.
+        device: What the patient walks with.
         values: Every named number by address [SI].
         unknowns: The numbers that a problem is free to choose.
         published: Whether it reproduces the quirks of the published model.
@@ -102,8 +101,8 @@ class Walker:
 
     def with_parameters(self, parameters: Sequence[float] | np.ndarray) -> Walker:
         """Return the walker in which the unknowns have these values [SI], in their order."""
-        values = with_unknowns(self.values, self.unknowns, parameters)
-        return self.with_values(values)
+        pairs = zip(self.unknowns, parameters, strict=True)
+        return self.with_values({a: float(x) for unknown, x in pairs for a in unknown.addresses})
 
     def with_values(self, values: Mapping[str, float]) -> Walker:
         """Return the walker with other numbers, by address [SI]."""
@@ -113,10 +112,8 @@ class Walker:
         if all(values[address] == self.values[address] for address in bodies):
             return changed
         model = pinocchio_model(self.patient, self.condition, self.published, values)
-        parameters = self.rigid_body.parameters_for(model)
-        return replace(
-            changed, model=model, rigid_body=replace(self.rigid_body, parameters=parameters)
-        )
+        body = replace(self.rigid_body, parameters=self.rigid_body.parameters_for(model))
+        return replace(changed, model=model, rigid_body=body)
 
     @property
     def total_mass(self) -> float:
@@ -131,8 +128,7 @@ class Walker:
     @cached_property
     def leg_length(self) -> float:
         """Mean distance from hip to sole in the zero pose [m]."""
-        data = self.model.createData()
-        zero = np.zeros(self.model.nq)
+        data, zero = self.model.createData(), np.zeros(self.model.nq)
         pin.forwardKinematics(self.model, data, zero)
         hip = np.mean([data.oMi[self.model.getJointId(f"hip_{s}")].translation[2] for s in "rl"])
         return float(hip - self.contact_points(zero)[:, 1].mean())
@@ -150,30 +146,15 @@ class Walker:
         return self.with_values(values).rigid_body.parameters - self.rigid_body.parameters
 
     def state(self, q: Any, v: Any, activation: Any) -> State:
-        """Return coordinates, velocities and activations by name.
-
-        Args:
-            q: Generalised coordinates, one entry or row per coordinate.
-            v: Generalised velocities, likewise.
-            activation: Activations, one entry or row per muscle torque generator.
-        """
-        names = self.skeleton.coordinates
-        muscles = [muscle.name for muscle in self.muscles]
-        return State(*(
-            dict(zip(keys, _entries(values), strict=True))
-            for keys, values in ((names, q), (names, v), (muscles, activation))
-        ))  # fmt: skip
+        """Return coordinates, velocities and activations by name; one entry or row for each."""
+        names, muscles = self.skeleton.coordinates, (muscle.name for muscle in self.muscles)
+        pairs = ((names, q), (names, v), (muscles, activation))
+        return State(*(dict(zip(keys, values, strict=True)) for keys, values in pairs))
 
     def element_forces(self, q: np.ndarray, v: np.ndarray, activation: np.ndarray) -> np.ndarray:
-        """Return the forces of all elements at m instants, by NumPy.
+        """Return the forces of all elements in order at m instants [N m], shape (m, k).
 
-        Args:
-            q: Generalised coordinates [m, rad], shape (m, 10).
-            v: Generalised velocities [m/s, rad/s], shape (m, 10).
-            activation: Activations in [0, 1], shape (m, 14).
-
-        Returns:
-            Forces [N m] in the order of `elements`, shape (m, k).
+        q [m, rad] and v [m/s, rad/s] are of shape (m, 10), activations in [0, 1] of shape (m, 14).
         """
         state = self.state(np.transpose(q), np.transpose(v), np.transpose(activation))
         return np.stack(element_forces(self.elements, state, self.values), axis=-1)
@@ -206,12 +187,8 @@ class Walker:
         Returns:
             Torques [N m] in the order of `conventions.GENERATORS`, shape (14,).
         """
-        n, m = self.skeleton.size, len(self.muscles)
-        q, v, activation = (
-            _vector(q, n, "q"),
-            _vector(v, n, "v"),
-            _vector(activation, m, "activation"),
-        )
+        q, v = (_vector(values, self.skeleton.size, name) for values, name in ((q, "q"), (v, "v")))
+        activation = _vector(activation, len(self.muscles), "activation")
         return self.element_forces(q, v, activation)[self.columns(self.muscles)]
 
     def orthosis_torques(self, q: Any, k_d: Any, k_p: Any) -> np.ndarray:
@@ -228,11 +205,12 @@ class Walker:
         q, rest = _vector(q, self.skeleton.size, "q"), np.zeros(self.skeleton.size)
         if not self.device.worn:
             return np.zeros(2)
-        pairs = zip(SIDES, np.broadcast_to(k_d, 2), np.broadcast_to(k_p, 2), strict=True)
+        given = {"dorsiflexion_stiffness": k_d, "plantarflexion_stiffness": k_p}
         springs = {
-            number.address: float(value)
-            for side, *pair in pairs
-            for number, value in zip(self.device.elements[side].numbers[:2], pair, strict=True)
+            number.address: float(np.broadcast_to(given[number.name], 2)[i])
+            for i, element in enumerate(self.device.forces)
+            for number in element.numbers
+            if number.name in given
         }
         forces = self.with_values(springs).element_forces(q, rest, np.zeros(len(self.muscles)))
         return forces[self.columns(self.device.forces)]
@@ -244,10 +222,9 @@ class Walker:
             muscle: Torque of each generator [N m], shape (14,).
             orthosis: Torque of the orthoses right, left [N m], shape (2,).
         """
-        muscle = _vector(muscle, len(self.muscles), "muscle")
-        orthosis = _vector(orthosis, 2, "orthosis")
         forces = np.zeros(sum(len(element.coordinates) for element in self.elements))
-        forces[self.columns(self.muscles)] = muscle
+        forces[self.columns(self.muscles)] = _vector(muscle, len(self.muscles), "muscle")
+        orthosis = _vector(orthosis, 2, "orthosis")
         if self.device.worn:
             forces[self.columns(self.device.forces)] = orthosis
         return self.generalised_forces(forces)
@@ -287,12 +264,8 @@ class Walker:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return `contact_dynamics` of m instants: vdot, shape (m, 10), and forces, shape (m, 8).
 
-        Args:
-            phase: The contact phase of all instants.
-            q: Generalised coordinates [m, rad], shape (m, 10).
-            v: Generalised velocities [m/s, rad/s], shape (m, 10).
-            tau: Generalised forces [N, N m], shape (m, 10).
-            terms: What evaluates `dynamics_terms` at m points, if not the function itself.
+        q, v and tau are of shape (m, 10); `terms` evaluates `dynamics_terms` at m points, if not
+        the function itself.
         """
         active = list((phase if isinstance(phase, ContactPhase) else phase_named(phase)).indices)
         count, n, size = len(q), self.skeleton.size, len(active)
@@ -311,45 +284,26 @@ class Walker:
 
     def contact_points(self, q: Any) -> np.ndarray:
         """Return right heel, right toe, left heel, left toe: x and z [m], shape (4, 2)."""
-        q = _vector(q, self.skeleton.size, "q")
-        return np.asarray(self.rigid_body.point_positions(q, self.rigid_body.parameters)).reshape(
-            4, 2
-        )
+        q, body = _vector(q, self.skeleton.size, "q"), self.rigid_body
+        return np.asarray(body.point_positions(q, body.parameters)).reshape(4, 2)
 
     @cached_property
     def dynamics_terms(self) -> ca.Function:
         """Function (q, v) -> mass matrix, bias, point Jacobian, point acceleration at vdot = 0."""
         body, theta = self.rigid_body, self.rigid_body.parameters
         q, v = ca.SX.sym("q", body.nq), ca.SX.sym("v", body.nq)
-        outputs = [
-            ca.densify(body.mass_matrix(q, theta)),
-            ca.densify(body.bias(q, v, theta)),
-            ca.densify(body.point_jacobian(q, theta)),
-            ca.densify(body.point_accelerations(q, v, ca.SX.zeros(body.nq), theta)),
-        ]
-        return ca.Function("dynamics", [q, v], outputs)
+        still = body.point_accelerations(q, v, ca.SX.zeros(body.nq), theta)
+        terms = body.mass_matrix(q, theta), body.bias(q, v, theta), body.point_jacobian(q, theta)
+        return ca.Function("dynamics", [q, v], [ca.densify(x) for x in (*terms, still)])
 
 
 def _vector(values: Any, size: int, name: str) -> np.ndarray:
-    """Return a finite vector of this size.
-
-    Raises:
-        InputError: If it has another size or entries that are not finite.
-    """
+    """Return a finite vector of this size, or refuse it."""
     vector = np.asarray(values, dtype=float).ravel()
-    if vector.size != size or not np.all(np.isfinite(vector)):
-        raise InputError(
-            f"{name} has {vector.size} entries"
-            if vector.size != size
-            else f"{name} has entries that are not finite",
-            allowed=f"{size} finite numbers",
-        )
-    return vector
-
-
-def _entries(values: Any) -> list[Any]:
-    """Return the entries of a list, or the rows of an array."""
-    return list(values)
+    if vector.size == size and np.all(np.isfinite(vector)):
+        return vector
+    what = f"{vector.size} entries" if vector.size != size else "entries that are not finite"
+    raise InputError(f"{name} has {what}", allowed=f"{size} finite numbers")
 
 
 def build_walker(
@@ -405,7 +359,7 @@ def _numbers(elements: Sequence[ForceElement], device: Device) -> tuple[Number, 
 
 
 def unknowns_of(condition: Condition, free: Sequence[str] = ()) -> tuple[Unknown, ...]:
-    """Return what a problem chooses: what is asked for, and what a device is there to be found for.
+    """Return what a problem chooses: what is asked for, and what a device is identified by.
 
     What a device is identified for stands first, per kind right before left, unless both sides
     alike are asked for.

@@ -10,8 +10,6 @@ from typing import Final
 import casadi as ca
 import numpy as np
 
-__all__ = ["FUNCTIONS", "KINDS", "Assembly", "Part", "Placement", "Source", "mapped_functions"]
-
 KINDS: Final = {"values": ("g1", "11"), "jacobian": ("gx", "x1"), "hessian": ("xx",)}
 """The block functions and the axes of their outputs: rows g, unknowns x or a single number."""
 

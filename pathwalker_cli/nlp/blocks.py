@@ -20,8 +20,6 @@ from pathwalker_cli.nlp.kernels import kernels
 from pathwalker_cli.nlp.tape import Tape, patterns_of
 from pathwalker_cli.nlp.taped import taped_functions
 
-__all__ = ["Block", "BlockProgram", "Expressions", "Occurrences"]
-
 
 @dataclass(frozen=True)
 class Expressions:

@@ -14,8 +14,6 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 
-__all__ = ["FrozenTerms"]
-
 
 @dataclass
 class FrozenTerms:

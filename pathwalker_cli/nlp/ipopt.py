@@ -15,15 +15,6 @@ from pathwalker_cli.nlp.program import Program
 from pathwalker_cli.nlp.stage_ldl import stage_factors
 from pathwalker_cli.nlp.watch import Observer, Watcher, interruptible
 
-__all__ = [
-    "IpoptSettings",
-    "Multipliers",
-    "NlpResult",
-    "NlpSolver",
-    "solve_program",
-    "warm_pushes",
-]
-
 _METHOD: Final = {
     "mu_strategy": "monotone",
     # programs come scaled; scaling by gradients at the start would depend on the start

@@ -11,8 +11,6 @@ from typing import Final
 
 from pathwalker_cli.errors import ConfigError
 
-__all__ = ["kernels", "kernels_level", "kernels_path"]
-
 _LEVELS: Final = ("generic", "x86-64-v3", "x86-64-v4")
 """Vectors that kernels are compiled for, from none to the widest."""
 

@@ -29,8 +29,6 @@ from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.nlp.program import Program, limits
 from pathwalker_cli.nlp.stage_ldl import SymmetricSystem, in_order_of
 
-__all__ = ["Answer", "KktSystem"]
-
 _REGULARISATION: Final = 1e-10
 """Added to the zero block, so that rows which say the same twice do no harm."""
 

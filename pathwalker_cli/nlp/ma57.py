@@ -24,8 +24,6 @@ from pathwalker_cli.nlp.kernels import kernels_path
 from pathwalker_cli.nlp.program import Program
 from pathwalker_cli.nlp.stage_ldl import PIVOT_THRESHOLD, Elimination, in_order_of
 
-__all__ = ["ipopt_elimination", "ma57_options"]
-
 
 def ma57_options() -> dict[str, Any]:
     """Return the options by which IPOPT takes the compiled factors for MA57."""

@@ -11,8 +11,6 @@ import ctypes
 import os
 from functools import cache
 
-__all__ = ["keep_freed_memory", "use_one_blas_thread"]
-
 _TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
 """Parameters of glibc's `mallopt`."""
 

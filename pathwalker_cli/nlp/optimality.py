@@ -14,8 +14,6 @@ import numpy as np
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.nlp.program import Program, limits
 
-__all__ = ["Optimality", "optimality"]
-
 _MEAN_MULTIPLIER: Final = 100.0
 """Mean multiplier up to which IPOPT measures stationarity as it is (its s_max)."""
 

@@ -8,8 +8,6 @@ from typing import Protocol
 import casadi as ca
 import numpy as np
 
-__all__ = ["Program", "limits"]
-
 
 class Program(Protocol):
     """Minimise f(x; p) subject to bounds on the n unknowns x and on the m rows g(x; p).

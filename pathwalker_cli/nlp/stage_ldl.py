@@ -20,16 +20,6 @@ from scipy.sparse.linalg import LinearOperator, gmres, splu
 
 from pathwalker_cli.nlp.kernels import kernels
 
-__all__ = [
-    "PIVOT_THRESHOLD",
-    "Elimination",
-    "FactorReport",
-    "StageFactors",
-    "SymmetricSystem",
-    "in_order_of",
-    "stage_factors",
-]
-
 PIVOT_THRESHOLD: Final = 1e-6
 """Least share of a column's largest entry that a pivot has; refinement makes up for weak pivots."""
 

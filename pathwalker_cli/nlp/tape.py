@@ -15,8 +15,6 @@ import numpy as np
 
 from pathwalker_cli.nlp.kernels import kernels
 
-__all__ = ["CONST", "INPUT", "LANES", "OPERATIONS", "OUTPUT", "Tape", "patterns_of"]
-
 LANES: Final = 8
 """Occurrences that the interpreter works on at a time."""
 

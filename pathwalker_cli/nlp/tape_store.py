@@ -27,8 +27,6 @@ from pathwalker_cli.nlp.kernels import kernels_path
 from pathwalker_cli.nlp.tape import Tape
 from pathwalker_cli.paths import source_stamps
 
-__all__ = ["KeptTapes", "Makers", "cache_folder", "keep_tapes", "kept_files", "kept_tapes"]
-
 _MOST_FILES: Final = 15
 """Structures that are kept; one takes some 10 MB."""
 _SUFFIX: Final = ".tapes"

@@ -14,8 +14,6 @@ from pathwalker_cli.nlp.assembly import FUNCTIONS, KINDS, Assembly
 from pathwalker_cli.nlp.kernels import kernels
 from pathwalker_cli.nlp.tape import INPUT, LANES, Tape
 
-__all__ = ["Columns", "taped_functions"]
-
 
 def taped_functions(
     assembly: Assembly, tapes: Sequence[Mapping[str, Tape]]

@@ -19,8 +19,6 @@ import numpy as np
 
 from pathwalker_cli.nlp.program import Program
 
-__all__ = ["Observer", "ProgressReport", "Watcher", "interruptible"]
-
 
 @dataclass(frozen=True)
 class ProgressReport:

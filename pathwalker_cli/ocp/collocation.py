@@ -23,8 +23,6 @@ from pathwalker_cli.ocp.phased import (
 from pathwalker_cli.ocp.problem import ProblemNumbers
 from pathwalker_cli.ocp.transcription import Transcription
 
-__all__ = ["CollocationProgram"]
-
 
 class CollocationProgram(Transcription[PhasePlaces]):
     """A problem with its numbers on one mesh.

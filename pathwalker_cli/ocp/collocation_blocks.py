@@ -20,8 +20,6 @@ from pathwalker_cli.ocp.phased import collocation_times, lagrange_weights, quadr
 from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase
 from pathwalker_cli.ocp.transcription import Unknown, boundary_expressions
 
-__all__ = ["CollocationBlocks"]
-
 
 def _differentiation(degree: int) -> np.ndarray:
     """Return the matrix from start and points of an interval to rates at the points."""

@@ -15,8 +15,6 @@ from pathwalker_cli.nlp.blocks import Block
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.layout import Layout, PhasePlaces
 
-__all__ = ["StageKeys"]
-
 RowsOf = Callable[[Block], np.ndarray]
 
 

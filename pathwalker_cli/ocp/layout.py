@@ -10,8 +10,6 @@ import numpy as np
 
 from pathwalker_cli.ocp.problem import BoundTable, MultiPhaseProblem, Variables
 
-__all__ = ["NODE", "Bounded", "Layout", "PhasePlaces", "PlaceBook", "collocation_layout"]
-
 NODE: Final = ("states", "smooth", "controls", "integrals")
 """What stands at every node of collocation, in this order."""
 

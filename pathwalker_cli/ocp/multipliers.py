@@ -12,8 +12,6 @@ from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.phased import quadrature_weights
 
-__all__ = ["transferred"]
-
 
 def transferred(
     old: CollocationProgram, multipliers: Multipliers, new: CollocationProgram

@@ -8,14 +8,6 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-__all__ = [
-    "PhaseMotion",
-    "PhasedMotion",
-    "collocation_times",
-    "lagrange_weights",
-    "quadrature_weights",
-]
-
 
 def collocation_times(degree: int) -> np.ndarray:
     """Return the Radau points of an interval [0, 1], the last one at 1, shape (degree,)."""

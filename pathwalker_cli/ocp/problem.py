@@ -20,18 +20,6 @@ import numpy as np
 
 from pathwalker_cli.nlp.frozen import FrozenTerms
 
-__all__ = [
-    "BoundTable",
-    "Boundary",
-    "Instant",
-    "MultiPhaseProblem",
-    "Phase",
-    "ProblemNumbers",
-    "Rows",
-    "Sample",
-    "Variables",
-]
-
 INFINITY = float("inf")
 
 Instant = tuple[ca.SX, ca.SX, ca.SX]

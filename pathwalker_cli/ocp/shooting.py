@@ -19,8 +19,6 @@ from pathwalker_cli.ocp.shooting_motion import Shooter, ShootingNodes
 from pathwalker_cli.ocp.shooting_steps import CASH_KARP, Edges
 from pathwalker_cli.ocp.transcription import Transcription
 
-__all__ = ["ShootingProgram"]
-
 
 class ShootingProgram(Transcription[ShootingPlaces]):
     """A shooting problem with its numbers on one mesh and one choice of steps.

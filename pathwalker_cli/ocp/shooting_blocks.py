@@ -30,8 +30,6 @@ from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase, Variables
 from pathwalker_cli.ocp.shooting_steps import CASH_KARP
 from pathwalker_cli.ocp.transcription import Unknown, boundary_expressions
 
-__all__ = ["PhaseBlocks", "ShootingBlocks", "ShootingProblem"]
-
 
 @dataclass(frozen=True)
 class ShootingProblem:

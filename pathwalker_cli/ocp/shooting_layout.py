@@ -11,8 +11,6 @@ from pathwalker_cli.ocp.problem import Phase
 from pathwalker_cli.ocp.shooting_blocks import ShootingProblem
 from pathwalker_cli.ocp.shooting_steps import CASH_KARP, Edges
 
-__all__ = ["ShootingPlaces", "shooting_layout"]
-
 
 @dataclass(frozen=True)
 class ShootingPlaces:

@@ -12,8 +12,6 @@ from pathwalker_cli.ocp.problem import ProblemNumbers
 from pathwalker_cli.ocp.shooting_blocks import ShootingBlocks, ShootingProblem
 from pathwalker_cli.ocp.shooting_steps import Edges, Slope, Step, adaptive_steps, fixed_steps
 
-__all__ = ["Shooter", "ShootingNodes"]
-
 
 @dataclass(frozen=True)
 class ShootingNodes:

@@ -24,8 +24,6 @@ import numpy as np
 
 from pathwalker_cli.errors import NotConvergedError
 
-__all__ = ["CASH_KARP", "Edges", "EmbeddedPair", "Slope", "Step", "adaptive_steps", "fixed_steps"]
-
 Slope = Callable[[float, np.ndarray], np.ndarray]
 """Returns dX/dt, shape (n,), at a time and a state X, shape (n,)."""
 

@@ -1,5 +1,1 @@
 """The name by which scripts import `solve_study`; it stands in `gait.solve`."""
-
-from pathwalker_cli.gait.solve import solve_study
-
-__all__ = ["solve_study"]

@@ -19,8 +19,6 @@ from pathwalker_cli.ocp.problem import (
     Variables,
 )
 
-__all__ = ["Transcription", "Unknown", "boundary_expressions"]
-
 P = TypeVar("P")
 
 

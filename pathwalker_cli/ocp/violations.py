@@ -12,8 +12,6 @@ from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.nlp.program import Program, limits
 from pathwalker_cli.ocp.transcription import Transcription
 
-__all__ = ["ActiveBound", "Violation", "active_bounds", "largest_violations"]
-
 _NEAR: Final = 1e-2
 """Distance in solver units beyond which a bound is never called active."""
 

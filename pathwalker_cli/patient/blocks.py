@@ -14,24 +14,6 @@ from pydantic import Field, field_validator, model_validator
 from pathwalker_cli.conventions import ANGLES, GENERATORS, SIDES, SUFFIX
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
 
-__all__ = [
-    "AddedMass",
-    "ContactPoints",
-    "FootPoints",
-    "LengthRange",
-    "OrthosisData",
-    "OrthosisFault",
-    "RealSpring",
-    "Recorded",
-    "SegmentLengths",
-    "SpeedRange",
-    "SpringRange",
-    "SpringSet",
-    "Springs",
-    "Strengths",
-    "orthosis_fault",
-]
-
 Length = Annotated[float, Quantity("m", 0.005, 1.0, above="is it in centimetres or millimetres?")]
 Offset = Annotated[
     float, Quantity("m", -0.4, 0.4, "is it in millimetres?", "is it in millimetres?")
@@ -108,15 +90,11 @@ class Strengths(YamlModel):
 
     def vector(self) -> tuple[float, ...]:
         """Return the 14 torques [N m] in the order of `conventions.GENERATORS`."""
-        return tuple(self._of(name) for name in GENERATORS)
-
-    def _of(self, generator: str) -> float:
-        """Return the torque of a generator such as "hip_flexion_l"."""
-        name, _, suffix = generator.rpartition("_")
-        for side in SIDES:
-            if SUFFIX[side] == suffix:
-                return float(getattr(self, name)[side])
-        return float(getattr(self, generator))
+        torques = dict(self)
+        for kind, value in self:
+            if isinstance(value, Sides):
+                torques |= {f"{kind}_{SUFFIX[side]}": value[side] for side in SIDES}
+        return tuple(float(torques[name]) for name in GENERATORS)
 
 
 class AddedMass(YamlModel):
@@ -171,6 +149,16 @@ _STOP_CLEARANCE: Final = 1.06
 from 19 / 18 on."""
 
 
+_DORSIFLEXION: Final = Quantity(
+    "rad", -0.7, -0.001, "is it in degrees?",
+    "dorsiflexion angles are negative: give it a minus sign",
+)  # fmt: skip
+_PLANTARFLEXION: Final = Quantity(
+    "rad", 0.001, 0.7, "plantarflexion angles are positive", "is it in degrees?"
+)
+_DIRECTIONS: Final = ("dorsiflexion", "plantarflexion")
+
+
 class OrthosisData(YamlModel):
     """Ankle-foot orthosis: geometry and springs, angles in rad (+ = plantarflexion)."""
 
@@ -178,24 +166,8 @@ class OrthosisData(YamlModel):
     neutral_angle: Annotated[float, Quantity("rad", -0.6, 0.6, *["is it in degrees?"] * 2)]
     free_play: Annotated[float, Quantity("rad", 1e-4, 0.2, above="is it in degrees?")]
     preload_torque: Annotated[float, Quantity("N m", 0.0, 50.0, below="give its size, unsigned")]
-    dorsiflexion_stop: Sides[
-        Annotated[
-            float,
-            Quantity(
-                "rad",
-                -0.7,
-                -0.001,
-                "is it in degrees?",
-                "dorsiflexion angles are negative: give it a minus sign",
-            ),
-        ]
-    ]
-    plantarflexion_stop: Sides[
-        Annotated[
-            float,
-            Quantity("rad", 0.001, 0.7, "plantarflexion angles are positive", "is it in degrees?"),
-        ]
-    ]
+    dorsiflexion_stop: Sides[Annotated[float, _DORSIFLEXION]]
+    plantarflexion_stop: Sides[Annotated[float, _PLANTARFLEXION]]
     stop_stiffness: Springs
     stiffness_guess: Springs
     stiffness_range: SpringRange
@@ -203,7 +175,7 @@ class OrthosisData(YamlModel):
 
     @model_validator(mode="after")
     def _springs(self) -> OrthosisData:
-        for name in ("dorsiflexion", "plantarflexion"):
+        for name in _DIRECTIONS:
             low, high = getattr(self.stiffness_range, name)
             guess = getattr(self.stiffness_guess, name)
             key = f"stiffness_range.{name}"
@@ -226,20 +198,12 @@ class OrthosisData(YamlModel):
 
     def ranges(self, side: str) -> dict[str, tuple[float, float]]:
         """Return every number of the torque curve of a side, springs with their whole range."""
-        single = {
-            "neutral_angle": self.neutral_angle,
-            "free_play": self.free_play,
-            "preload_torque": self.preload_torque,
-            "dorsiflexion_stop": self.dorsiflexion_stop[side],
-            "plantarflexion_stop": self.plantarflexion_stop[side],
-            "dorsiflexion_stop_stiffness": self.stop_stiffness.dorsiflexion,
-            "plantarflexion_stop_stiffness": self.stop_stiffness.plantarflexion,
-        }
-        return {
-            "dorsiflexion_stiffness": self.stiffness_range.dorsiflexion,
-            "plantarflexion_stiffness": self.stiffness_range.plantarflexion,
-            **{name: (value, value) for name, value in single.items()},
-        }
+        single = {n: getattr(self, n) for n in ("neutral_angle", "free_play", "preload_torque")}
+        for name in _DIRECTIONS:
+            single[f"{name}_stop"] = getattr(self, f"{name}_stop")[side]
+            single[f"{name}_stop_stiffness"] = getattr(self.stop_stiffness, name)
+        springs = {f"{name}_stiffness": getattr(self.stiffness_range, name) for name in _DIRECTIONS}
+        return {**springs, **{name: (value, value) for name, value in single.items()}}
 
 
 @dataclass(frozen=True)
@@ -269,7 +233,7 @@ def orthosis_fault(ranges: Mapping[str, tuple[float, float]], side: str) -> Orth
     low = {name: pair[0] for name, pair in ranges.items()}
     high = {name: pair[1] for name, pair in ranges.items()}
     stops = high["dorsiflexion_stop"], low["plantarflexion_stop"]
-    middle, clearance = ("neutral_angle", _STOP_CLEARANCE * high["free_play"])
+    middle, clearance = "neutral_angle", _STOP_CLEARANCE * high["free_play"]
     if not stops[0] < low[middle] - clearance < high[middle] + clearance < stops[1]:
         return OrthosisFault(
             (middle, "dorsiflexion_stop", "plantarflexion_stop", "free_play"),

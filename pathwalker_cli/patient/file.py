@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -34,19 +34,6 @@ from pathwalker_cli.patient.proportions import (
     TOE_SHARE,
     default_length,
 )
-
-__all__ = [
-    "ContactPoints",
-    "FootPoints",
-    "OrthosisData",
-    "Patient",
-    "Recorded",
-    "SegmentLengths",
-    "Strengths",
-    "load_patient",
-    "recordings_beside",
-    "shipped_patients",
-]
 
 JENSEN_AGES = Quantity(
     "years",
@@ -226,7 +213,7 @@ class Patient(YamlModel):
             side: FootPoints(heel=(HEEL_SHARE * foot, sole), toe=(TOE_SHARE * foot, sole))
             for side, foot in feet.items()
         }
-        return Sides[FootPoints](right=points["right"], left=points["left"])
+        return Sides[FootPoints](**points)
 
     @property
     def leg_length(self) -> float:
@@ -242,13 +229,11 @@ class Patient(YamlModel):
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """One sentence for everything that was filled in or overridden."""
-        missing = [
-            n for n in SegmentLengths.model_fields if getattr(self.segment_lengths, n) is None
-        ]
         notes = [
             f"segment length {name}: {default_length(name, self.height):g} m, from body "
             f"proportions ({SOURCE})"
-            for name in missing
+            for name, given in self.segment_lengths
+            if given is None
         ]
         if self.contact_points.barefoot is None:
             notes.append("contact points barefoot: from foot length and height by proportion")
@@ -294,8 +279,8 @@ def load_patient(id_or_path: str | Path, recordings: tuple[Path, ...] = ()) -> P
     path = _patient_file(id_or_path)
     text = read_text(path, PatientError)
     mapping, lines = mapping_in(text, path, PatientError)
-    if isinstance(worn := mapping.get("orthosis"), str):
-        apart = path.parent / worn
+    if isinstance(named := mapping.get("orthosis"), str):
+        apart = path.parent / named
         more = read_text(apart, PatientError)
         content, places = mapping_in(more, apart, PatientError)
         orthosis = validate(
@@ -306,6 +291,26 @@ def load_patient(id_or_path: str | Path, recordings: tuple[Path, ...] = ()) -> P
     patient = validate(mapping, Patient, where=str(path), error=PatientError, lines=lines)
     patient._origin = _Origin(path, text.encode(), (path.parent / "recordings", *recordings))
     return patient
+
+
+@cache
+def healthy_child() -> Patient:
+    """Return the healthy child that strengths are compared with."""
+    return load_patient("sreenivasa2017-healthy")
+
+
+def healthy_strength(name: str, body_mass: float, height: float) -> float:
+    """Return a maximum isometric torque of a healthy child, the shipped one grown or shrunk [N m].
+
+    A torque is a force, which grows with body mass, times a lever, which grows with height.
+
+    Args:
+        name: Field of `Strengths`, e.g. "hip_extension".
+        body_mass: Body mass of the child [kg].
+        height: Height of the child [m].
+    """
+    child, same = healthy_child(), f"strengths.{name}.right"
+    return child.number(same) * (body_mass * height) / (child.body_mass * child.height)
 
 
 def recordings_beside(id_or_path: str | Path) -> Path:

@@ -17,8 +17,6 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Final
 
-__all__ = ["ANKLE_HEIGHT", "FRACTIONS", "HEEL_SHARE", "SOURCE", "TOE_SHARE", "default_length"]
-
 SOURCE: Final = "Drillis and Contini (1966), adults"
 
 _HIP_HEIGHT: Final = 0.530

@@ -12,14 +12,11 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field
 
-from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import ConfigError, PatientError, did_you_mean
 from pathwalker_cli.io.fields import Quantity, YamlModel
 from pathwalker_cli.io.yaml_file import validate
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import SegmentLengths
-
-__all__ = ["Variation", "varied"]
 
 _IDENTITY: Final = frozenset({"id", "description", "sex", "age_for_regressions_reason"})
 """Keys of a patient's file that hold no number."""
@@ -54,10 +51,6 @@ def varied(patient: Patient, variation: Variation) -> Patient:
 
     Lengths that the file leaves to body proportions are filled in before they are changed.
 
-    Args:
-        patient: The patient as in the file.
-        variation: What is different.
-
     Raises:
         ConfigError: If a place does not exist or holds no number.
         PatientError: If the patient that results is refused.
@@ -82,14 +75,12 @@ def varied(patient: Patient, variation: Variation) -> Patient:
 def _filled_in(patient: Patient) -> dict[str, Any]:
     """Return the content of a patient's file with all lengths written out."""
     content: dict[str, Any] = patient.model_dump(mode="json")
-    lengths = content["segment_lengths"]
+    lengths, points = content["segment_lengths"], content["contact_points"]
     for name in SegmentLengths.model_fields:
         if lengths[name] is None:
             lengths[name] = patient.length(name, "right")
-    for condition in CONDITIONS:
-        points = content["contact_points"]
-        if points[condition] is None and condition == "barefoot":
-            points[condition] = patient.contacts(condition).model_dump(mode="json")
+    if points["barefoot"] is None:
+        points["barefoot"] = patient.contacts("barefoot").model_dump(mode="json")
     return {key: value for key, value in content.items() if value is not None}
 
 

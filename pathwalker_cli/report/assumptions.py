@@ -14,8 +14,6 @@ from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.results.metrics import RunMetrics
 from pathwalker_cli.results.text import bound_line, interesting, notes_together, source_lines
 
-__all__ = ["assumption_section"]
-
 _METHODS: Final = {
     "collocation": "direct collocation",
     "multiple-shooting": "direct multiple shooting",

@@ -11,8 +11,6 @@ from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
 from pathwalker_cli.studies.batch.ledger import CASES, CONVERGED, PENDING, TABLE, read_metrics
 
-__all__ = ["cohort_page"]
-
 Rows = Sequence[Mapping[str, str]]
 
 _COLUMNS: Final = ("case", "patient", "problem", "status")

@@ -18,15 +18,6 @@ from pathwalker_cli.stride.measure import FORCE, LOADS, Measure
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.stride.stride import Stride
 
-__all__ = [
-    "Compared",
-    "Comparison",
-    "compare_runs",
-    "comparison_content",
-    "comparison_lines",
-    "write_comparison_csv",
-]
-
 _GOALS: Final = "Clinical goals, whether or not the cost weighs them"
 _WIDTH: Final = 80
 _NAME: Final = 11

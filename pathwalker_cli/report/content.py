@@ -5,18 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = [
-    "NOT_A_DEVICE",
-    "Drawing",
-    "Fact",
-    "Page",
-    "Row",
-    "Section",
-    "Shape",
-    "Table",
-    "fact_table",
-]
-
 NOT_A_DEVICE = (
     "PathWalker is research software. It is not a medical device, and nothing on this page is a "
     "basis for the treatment of a patient."

@@ -32,14 +32,6 @@ from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure
 from pathwalker_cli.studies.tradeoff.result import Tradeoff
 from pathwalker_cli.studies.uncertainty.figures import spread_figure
 
-__all__ = [
-    "curve_section",
-    "landscape_drawing",
-    "spread_drawing",
-    "torque_drawing",
-    "tradeoff_drawing",
-]
-
 
 def curve_section(runs: Sequence[ReportRun]) -> Section:
     """Return angles, ground forces, moments, ankle torque over angle and activations."""

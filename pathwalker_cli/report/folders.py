@@ -14,8 +14,6 @@ from pathwalker_cli.io.yaml_file import validate
 from pathwalker_cli.report.summaries import SUMMARIES, Summary
 from pathwalker_cli.studies import registry
 
-__all__ = ["STUDIES", "Kind", "Study", "folder_kind", "sorted_folders", "studies_near"]
-
 Kind = str
 """A run, recorded gait, a cohort, or the command of a study."""
 

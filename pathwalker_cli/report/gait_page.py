@@ -18,8 +18,6 @@ from pathwalker_cli.stride.measure import KNEE, Measure
 from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.verdict import snapped_warning
 
-__all__ = ["gait_page", "gait_section"]
-
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
     """Return the page about the runs of one patient.

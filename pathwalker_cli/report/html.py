@@ -20,8 +20,6 @@ from pathwalker_cli.report.gait_page import gait_page
 from pathwalker_cli.report.recorded_page import recorded_page
 from pathwalker_cli.report.runs import read_runs
 
-__all__ = ["page_html", "page_of"]
-
 _UNIT: Final = re.compile(r"(?<=\d) (?=%|N m|m/s|s/m|deg\b|kg\b)|(?<=\bN) (?=m\b)")
 """Spaces before and within units."""
 

@@ -16,8 +16,6 @@ from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
 from pathwalker_cli.report.figures import torque_drawing
 
-__all__ = ["recorded_page"]
-
 Rows = Sequence[Mapping[str, str]]
 
 _STANCES: Final = ("condition", "trial", "side", "strike", "toe-off", "measured", "reason")

@@ -16,8 +16,6 @@ from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.verdict import Verdict, verdict_of_metrics
 
-__all__ = ["ReportRun", "changes_of", "read_runs"]
-
 
 @dataclass(frozen=True)
 class ReportRun:

@@ -20,8 +20,6 @@ from pathwalker_cli.studies.verdict import (
     stop_text,
 )
 
-__all__ = ["prescribed", "recommended", "spring_section", "verdict_words"]
-
 _HEAD: Final = (
     "spring", "take", "[N m/rad]", "[N m/deg]", "found [N m/rad]",
     f"cost within {100 * SHARE:g} % [N m/rad]",

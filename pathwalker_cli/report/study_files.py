@@ -14,8 +14,6 @@ from pathwalker_cli.studies.landscape.result import ROOT, Landscape, Point
 from pathwalker_cli.studies.measures import Ranges, measures_with
 from pathwalker_cli.studies.uncertainty.result import Spread
 
-__all__ = ["Spreads", "landscape_of", "spreads_of"]
-
 _KINDS = ("dorsiflexion_stiffness", "plantarflexion_stiffness")
 
 

@@ -23,8 +23,6 @@ from pathwalker_cli.studies.sensitivity.result import label_of
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, tradeoff_of_content
 from pathwalker_cli.studies.uncertainty.result import Spread, shown_text
 
-__all__ = ["study_section"]
-
 _LEAST: Final = 1e-3
 """Elasticity [% per %] below which a number moves nothing that matters."""
 

@@ -9,8 +9,6 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from pathwalker_cli.io.fields import invalid
 from pathwalker_cli.stride.measures import measures_in
 
-__all__ = ["SUMMARIES", "Summary"]
-
 Number = float | None
 Numbers = dict[str, Number]
 Pair = tuple[float, float]

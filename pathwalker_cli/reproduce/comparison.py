@@ -17,8 +17,6 @@ from pathwalker_cli.inverse.cycles import cycle_band
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.reproduce.results import InverseResult, ProblemResult, Results
 
-__all__ = ["Ours", "Row", "all_rows"]
-
 _PREDICTED: Final = ("mapd-barefoot", "mapd-orthosis", "mapd-ws-orthosis")
 _RECORDED: Final = ("recorded-barefoot", "recorded-orthosis")
 _BOUNDS: Final = "the authors' bounds are not published"

@@ -34,8 +34,6 @@ from pathwalker_cli.stride.figures.style import (
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import own_cycle
 
-__all__ = ["save_paper_figures"]
-
 _NAMES: Final = {
     "ls-barefoot": "LS-Barefoot",
     "mapd-barefoot": "MAPD-Barefoot",

@@ -22,8 +22,6 @@ from pathwalker_cli.reproduce.words import (
     table,
 )
 
-__all__ = ["page_text"]
-
 _HEAD: Final = (
     "Results of `pathwalker reproduce` beside those of Sreenivasa M, Millard M, Felis M, Mombaur "
     "K, Wolf SI (2017), Frontiers in Computational Neuroscience 11:23, "

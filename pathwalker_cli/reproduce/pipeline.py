@@ -30,8 +30,6 @@ from pathwalker_cli.studies.base import check_folder
 from pathwalker_cli.studies.run import done_run
 from pathwalker_cli.versions import versions
 
-__all__ = ["ENTRIES", "ORDER", "PAGE", "SEVERAL", "Solve", "planned_studies", "reproduce"]
-
 ORDER: Final = ("ls-barefoot", "mapd-barefoot", "mapd-orthosis", "mapd-ws-orthosis", "mapd-healthy")
 """The problems in the order in which they are solved; each has a shipped config of its name."""
 

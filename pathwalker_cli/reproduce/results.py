@@ -26,18 +26,6 @@ from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import stride_of
 
-__all__ = [
-    "METHODS",
-    "NO_C3D",
-    "InverseResult",
-    "ProblemResult",
-    "Results",
-    "evaluated",
-    "inverse_config",
-    "inverse_result",
-    "recordings",
-]
-
 METHODS: Final = ("default", "published")
 """Methods of inverse dynamics, ours and the article's."""
 

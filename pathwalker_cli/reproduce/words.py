@@ -11,8 +11,6 @@ from pathwalker_cli.evaluation.evaluate import compared
 from pathwalker_cli.evaluation.paper import PaperNumber
 from pathwalker_cli.reproduce.comparison import Ours, Row
 
-__all__ = ["degrees", "deviation", "label", "ours_text", "plain", "printed", "subject", "table"]
-
 _FACTOR: Final = {"deg": float(to_degrees(1.0)), "%": 100.0, "h": 1.0 / 3600.0}
 """From SI units to those of the article."""
 

@@ -24,18 +24,6 @@ from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.versions import today, versions
 
-__all__ = [
-    "METRICS_HASH",
-    "RUN_FORMAT",
-    "RunInputs",
-    "RunMetrics",
-    "metrics_hash",
-    "run_inputs",
-    "run_metrics",
-    "sha256",
-    "stiffness_ranges",
-]
-
 METRICS_HASH: Final = "metrics_hash"
 """Key of the SHA-256 of all other metrics, by which a change is found."""
 

@@ -20,8 +20,6 @@ from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
-__all__ = ["read_arrays", "read_motion", "read_multipliers", "write_motion", "write_multipliers"]
-
 _ARRAYS: Final = (
     "mesh", "states", "smooth", "controls", "integrals", "inner_states", "algebraic"
 )  # fmt: skip

@@ -18,8 +18,8 @@ import numpy as np
 from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.gait.recorded import start_recording
 from pathwalker_cli.gait.solution import GaitSolution
-from pathwalker_cli.gait.start import start_recording
 from pathwalker_cli.inverse.figures import recorded_reference
 from pathwalker_cli.io.atomic import check_room, swapped, sweep
 from pathwalker_cli.io.json_file import read_json, write_json
@@ -48,20 +48,6 @@ from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.results.text import shortfall_text
 from pathwalker_cli.stride.figures import save_figures
 from pathwalker_cli.stride.series import GaitSeries
-
-__all__ = [
-    "CONFIG",
-    "ENTRIES",
-    "PATIENT",
-    "Run",
-    "check_target",
-    "claimed_run",
-    "default_folder",
-    "load_run",
-    "release_runs",
-    "warm_start_run",
-    "write_run",
-]
 
 CONFIG: Final = "config.resolved.yaml"
 """The config of a run with every value written out."""

@@ -26,8 +26,6 @@ from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import centre_of_pressure
 from pathwalker_cli.trajectory import Trajectory
 
-__all__ = ["DIGITS", "TABLES", "controls_table", "forces_table", "states_table", "torques_table"]
-
 DIGITS: Final = 9
 """Significant digits: finer than the solver's tolerance, so nothing is lost on the way."""
 

@@ -11,31 +11,10 @@ from rich.table import Table
 from rich.text import Text
 
 from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES, SUFFIX, to_degrees
-from pathwalker_cli.gait.shortfall import Shortfall
-from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum
+from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, Shortfall
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import OrthosisData
 from pathwalker_cli.stride.measures import TABLES, expanded, measure_of, measures_in
-
-__all__ = [
-    "angle_words",
-    "bound_line",
-    "bound_lines",
-    "detail_lines",
-    "end_of",
-    "failure_text",
-    "interesting",
-    "notes_together",
-    "optimum_lines",
-    "orthosis_rows",
-    "shortfall_text",
-    "source_lines",
-    "spring_ends",
-    "spring_notes",
-    "summary",
-    "summary_renderable",
-    "summary_rows",
-]
 
 _AT_LIMIT: Final = 1e-3
 """Share of its range within which a value counts as sitting at a limit: interior-point solvers

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from pathwalker_cli.errors import PatientError
-from pathwalker_cli.model.healthy import healthy_child, healthy_strength
 from pathwalker_cli.patient import JENSEN_AGES
-
-__all__ = ["AGE", "Child", "made_child"]
+from pathwalker_cli.patient.file import healthy_child, healthy_strength
 
 AGE: Final = 9.0
 """Age of a child of which nothing is said [years]."""

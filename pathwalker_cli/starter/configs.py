@@ -10,8 +10,6 @@ from typing import Final
 from pathwalker_cli.io.commented_yaml import Entry, entries
 from pathwalker_cli.paths import shipped
 
-__all__ = ["WIDTH", "comment", "commented", "config_files", "unbroken"]
-
 WIDTH: Final = 80
 """Columns of a terminal."""
 

@@ -29,8 +29,6 @@ from pathwalker_cli.io.recordings import CompactRecording, read_recording, recor
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient, load_patient
 
-__all__ = ["made_recordings", "plate_channels", "write_example"]
-
 SOURCE: Final = "sreenivasa2017-patient"
 """Whose recordings are played."""
 

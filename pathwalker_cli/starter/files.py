@@ -24,8 +24,6 @@ from pathwalker_cli.patient.proportions import ANKLE_HEIGHT, HEEL_SHARE, TOE_SHA
 from pathwalker_cli.starter.child import Child
 from pathwalker_cli.starter.configs import WIDTH, comment, commented, config_files, unbroken
 
-__all__ = ["command_lines", "explained_keys", "folder_files", "next_steps", "write_folder"]
-
 _LENGTHS: Final = {
     "pelvis": "Length of the pelvis segment.",
     "hip_drop": "How far the hip joints lie below the pelvis origin.",

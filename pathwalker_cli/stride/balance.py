@@ -15,8 +15,6 @@ import pinocchio as pin
 from pathwalker_cli.conventions import CONTACT_POINTS
 from pathwalker_cli.stride.series import GaitSeries
 
-__all__ = ["Balance", "balance"]
-
 
 @dataclass(frozen=True)
 class Balance:

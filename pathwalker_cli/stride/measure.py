@@ -12,8 +12,6 @@ import numpy as np
 from pathwalker_cli.conventions import SIDES, Side, to_degrees
 from pathwalker_cli.stride.stride import NotKnownError, Part, Stride
 
-__all__ = ["SECTIONS", "Measure", "per_side"]
-
 WALK: Final = "Steps and time"
 KNEE: Final = "Least knee flexion in stance"
 TRIAL: Final = "Joint angles, RMS difference to one trial at equal time"

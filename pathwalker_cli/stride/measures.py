@@ -29,18 +29,6 @@ from pathwalker_cli.stride.measure import (
 )  # fmt: skip
 from pathwalker_cli.stride.stride import LOADED_SHARE, Stride, contacts, toe_bearing
 
-__all__ = [
-    "REGISTRY",
-    "TABLES",
-    "ankle_line",
-    "ankle_torque_line",
-    "expanded",
-    "measure_of",
-    "measures_in",
-    "metrics_of",
-    "numbers_of",
-]
-
 
 def _effort(stride: Stride) -> float:
     return float(stride.weights @ (stride.known("activation") ** 2).sum(axis=1))

@@ -13,8 +13,6 @@ from pathwalker_cli.model.elements.muscle import excitation_from_rate
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 
-__all__ = ["GaitSeries", "gait_series"]
-
 
 @dataclass(frozen=True)
 class GaitSeries:

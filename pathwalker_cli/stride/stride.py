@@ -18,25 +18,6 @@ from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.stride.series import GaitSeries
 
-__all__ = [
-    "LOADED_SHARE",
-    "POINTS",
-    "NotKnownError",
-    "OwnCycle",
-    "Part",
-    "Stride",
-    "body_points",
-    "centre_of_pressure",
-    "contacts",
-    "loaded",
-    "own_cycle",
-    "phase_stances",
-    "point_rows",
-    "stride_of",
-    "switching_times",
-    "toe_bearing",
-]
-
 POINTS: Final = 101
 """Points of a normalised curve: one per cent each."""
 

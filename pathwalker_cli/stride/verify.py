@@ -15,13 +15,6 @@ from pathwalker_cli.nlp.taped import Columns
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.stride.series import GaitSeries
 
-__all__ = [
-    "Reintegration",
-    "equation_residual",
-    "reintegrate",
-    "second_engine_residual",
-]
-
 
 @dataclass(frozen=True)
 class Reintegration:

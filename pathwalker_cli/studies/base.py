@@ -22,21 +22,6 @@ from pathwalker_cli.io.lock import locked
 from pathwalker_cli.results.run_folder import Run, load_run
 from pathwalker_cli.studies.run import RunLog, done_run, run_study
 
-__all__ = [
-    "NeighbourStudy",
-    "Plan",
-    "StudyKind",
-    "Work",
-    "base_case",
-    "base_run",
-    "check_folder",
-    "claimed_folder",
-    "load_study",
-    "planned",
-    "require_optimum",
-    "resolver_of",
-]
-
 _TRANSCRIPTION: Final = "collocation"
 
 

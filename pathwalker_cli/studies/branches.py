@@ -15,8 +15,6 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-__all__ = ["Attempt", "Branch", "Exploration", "Graph", "Rules", "Solve", "Values", "explore"]
-
 Values = tuple[float, ...]
 
 

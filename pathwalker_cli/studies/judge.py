@@ -28,8 +28,6 @@ from pathwalker_cli.studies.verdict import (
     Verdict,
 )
 
-__all__ = ["Edge", "find_edge", "verdict_of"]
-
 _CANDIDATES: Final = 2
 """Real springs next to an identified stiffness that are considered."""
 

@@ -12,17 +12,6 @@ from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measures_in, numbers_of
 from pathwalker_cli.stride.stride import stride_of
 
-__all__ = [
-    "COMPARED",
-    "Ranges",
-    "all_measures",
-    "free_units",
-    "measures",
-    "measures_with",
-    "range_content",
-    "ranges_of",
-]
-
 COMPARED: Final = (
     "cost",
     *(f"{stem}_{side}" for stem in ("min_stance_knee_flexion", "step_length")

@@ -24,16 +24,6 @@ from pathwalker_cli.studies.base import require_optimum, resolver_of
 from pathwalker_cli.studies.branches import Solve, Values
 from pathwalker_cli.studies.measures import measures
 
-__all__ = [
-    "STOPPED",
-    "Journal",
-    "Neighbours",
-    "Solved",
-    "motion_distance",
-    "motion_signature",
-    "solve_all",
-]
-
 STOPPED: Final = "stopped by the user; the same command goes on from there"
 """Why nothing further is solved."""
 

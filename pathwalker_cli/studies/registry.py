@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from pathwalker_cli.studies.base import StudyKind
 
-__all__ = ["STUDIES", "StudyEntry"]
-
 
 @dataclass(frozen=True)
 class StudyEntry:

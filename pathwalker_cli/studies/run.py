@@ -24,8 +24,6 @@ from pathwalker_cli.results.run_folder import (
 from pathwalker_cli.studies.judge import verdict_of
 from pathwalker_cli.studies.verdict import Verdict, verdict_lines
 
-__all__ = ["Outcome", "RunLog", "done_run", "run_study"]
-
 
 class Outcome(NamedTuple):
     """How a study ended.
@@ -128,7 +126,7 @@ def _solve(case: Case, earlier: Run | None, log: RunLog) -> GaitSolution:
     motion = None if earlier is None else earlier.motion
     # what few solves need is loaded where it is needed: the others begin 0.4 s sooner
     if case.config.transcription == "multiple-shooting":
-        from pathwalker_cli.gait.by_shooting import solve_by_shooting
+        from pathwalker_cli.gait.shooting import solve_by_shooting
 
         return solve_by_shooting(GaitSolver(case, log), motion)
     if case.config.starts > 1 and motion is None:

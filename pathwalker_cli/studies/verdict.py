@@ -18,22 +18,6 @@ from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.results.text import angle_words
 from pathwalker_cli.stride.measures import measure_of
 
-__all__ = [
-    "PRESCRIBED",
-    "SHARE",
-    "NumberVerdict",
-    "SnappedSprings",
-    "StopVerdict",
-    "Verdict",
-    "number_text",
-    "per_degree",
-    "reservations",
-    "snapped_warning",
-    "stop_text",
-    "verdict_lines",
-    "verdict_of_metrics",
-]
-
 SHARE: Final = 0.05
 """Rise of the cost that still counts as good."""
 

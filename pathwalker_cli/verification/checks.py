@@ -27,8 +27,6 @@ from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.stride.verify import equation_residual, reintegrate, second_engine_residual
 
-__all__ = ["Check", "Verification", "verify_run"]
-
 _SAME: Final = 1e-6
 """Relative difference up to which two numbers of a file count as the same."""
 _EQUATIONS: Final = 1e-6
@@ -184,7 +182,9 @@ def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[
     metrics, ranges = run.metrics, run.config.cost.comfort_ranges
     made = dict(numbers)
     if run.config.transcription == "collocation":
-        terms = cost_terms(run.motion, solver.gait.costs, solver.weights, solver.samples)
+        terms = cost_terms(
+            run.motion, solver.gait.costs, solver.config.cost.weights, solver.samples
+        )
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
         made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)

@@ -10,8 +10,6 @@ from pathwalker_cli.io.csv_file import read_rows
 from pathwalker_cli.studies.batch.ledger import CASES, TABLE, numbers_of, read_metrics
 from pathwalker_cli.verification.checks import Check, Verification
 
-__all__ = ["runs_in", "verify_table"]
-
 _HELD: Final = {TABLE: CASES, "tradeoff.csv": "runs"}
 """Where studies keep runs, by a file that only their folders have."""
 

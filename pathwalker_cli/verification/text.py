@@ -10,8 +10,6 @@ import numpy as np
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.verification.checks import Check, Verification
 
-__all__ = ["difference_lines", "verification_lines"]
-
 
 def verification_lines(verification: Verification) -> Iterator[str]:
     """Yield a heading, one line per check, and the outcome."""

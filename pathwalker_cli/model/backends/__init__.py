@@ -7,7 +7,7 @@ Newton-Euler algorithm written in CasADi).  All deliver the same functions.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -18,28 +18,18 @@ import pinocchio as pin
 
 from pathwalker_cli.errors import BackendError
 from pathwalker_cli.model.backends import bindings, compiled, direct
-from pathwalker_cli.model.backends.functions import RigidBodyFunctions, fold, parameters_of
-from pathwalker_cli.model.backends.topology import Topology, all_parameters
+from pathwalker_cli.model.backends.functions import (
+    RigidBodyFunctions,
+    Topology,
+    all_parameters,
+    fold,
+)
 
-__all__ = [
-    "BACKENDS",
-    "BackendReport",
-    "RigidBodyFunctions",
-    "available_backends",
-    "backend_report",
-    "parameters_of",
-    "rigid_body_functions",
-]
+_MODULES = MappingProxyType({"pinocchio.casadi": bindings, "compiled": compiled, "direct": direct})
+"""Each says by `describe` what would run, or raises what is missing, and has `build`."""
 
-BACKENDS = ("pinocchio.casadi", "compiled", "direct")
+BACKENDS = tuple(_MODULES)
 """Names of all back ends in order of preference."""
-
-
-@dataclass(frozen=True)
-class _Backend:
-    build: Callable[[Topology], dict[str, ca.Function]]
-    describe: Callable[[], str]
-    """Say what would run, or raise a `BackendError` that says what is missing."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +45,6 @@ class BackendReport:
     name: str
     available: bool
     detail: str
-
-
-_BACKENDS = MappingProxyType(
-    {
-        "pinocchio.casadi": _Backend(bindings.build, bindings.describe),
-        "compiled": _Backend(compiled.build, compiled.describe),
-        "direct": _Backend(direct.build, direct.describe),
-    }
-)
 
 
 def backend_report() -> tuple[BackendReport, ...]:
@@ -123,11 +104,11 @@ def _folded(
         raise BackendError(
             f"back end {name!r} is not available: {report.detail}; or use one of auto, {others}"
         )
-    return MappingProxyType(fold(topology, _BACKENDS[name].build(topology), nonzero))
+    return MappingProxyType(fold(topology, _MODULES[name].build(topology), nonzero))
 
 
 def _report(name: str) -> BackendReport:
     try:
-        return BackendReport(name, True, _BACKENDS[name].describe())
+        return BackendReport(name, True, _MODULES[name].describe())
     except BackendError as error:
         return BackendReport(name, False, str(error))

@@ -11,10 +11,12 @@ import numpy as np
 import pinocchio as pin
 
 from pathwalker_cli.errors import BackendError
-from pathwalker_cli.model.backends.functions import SIGNATURES
-from pathwalker_cli.model.backends.topology import JOINT_ENTRIES, POINT_ENTRIES, Topology
-
-__all__ = ["bindings", "build", "describe", "evaluate"]
+from pathwalker_cli.model.backends.functions import (
+    JOINT_ENTRIES,
+    POINT_ENTRIES,
+    SIGNATURES,
+    Topology,
+)
 
 _PLANE = [0, 2]
 
@@ -51,18 +53,10 @@ def build(topology: Topology) -> dict[str, ca.Function]:
 def evaluate(
     module: ModuleType, topology: Topology, q: Any, v: Any, vdot: Any, theta: Any
 ) -> dict[str, Any]:
-    """Run Pinocchio's algorithms in a scalar type.
+    """Return the values of the functions of `SIGNATURES` by name, by Pinocchio's own algorithms.
 
-    Args:
-        module: `pinocchio.casadi` for SX, `pinocchio` for numbers.
-        topology: Topology of the model.
-        q: Generalised coordinates [m, rad].
-        v: Generalised velocities [m/s, rad/s].
-        vdot: Generalised accelerations [m/s^2, rad/s^2].
-        theta: Parameters as in `Topology.parameter_names`.
-
-    Returns:
-        The values of the functions of `SIGNATURES`, by name.
+    `module` is `pinocchio.casadi` for SX, `pinocchio` for numbers; `theta` holds all parameters, as
+    in `Topology.parameter_names`; units are those of `RigidBodyFunctions`.
     """
     model = _model(module, topology, theta)
     data = model.createData()

@@ -10,10 +10,7 @@ import casadi as ca
 import pinocchio as pin
 
 from pathwalker_cli.errors import BackendError
-from pathwalker_cli.model.backends.functions import SIGNATURES
-from pathwalker_cli.model.backends.topology import JOINT_TYPES, Topology
-
-__all__ = ["build", "describe", "library"]
+from pathwalker_cli.model.backends.functions import JOINT_TYPES, SIGNATURES, Topology
 
 _LIBRARY = "libpinocchio_casadi.so"
 _REINSTALL = "install pathwalker-cli again, with a C++ compiler at hand"
@@ -64,11 +61,7 @@ def library() -> ctypes.CDLL:
 
 
 def check_versions(compiled_against: str) -> None:
-    """Raise a `BackendError` unless the installed Pinocchio and CasADi are these.
-
-    Args:
-        compiled_against: Both versions, separated by a space.
-    """
+    """Raise a `BackendError` unless Pinocchio and CasADi are of these versions, e.g. "3.4 3.7"."""
     installed = f"{pin.__version__} {ca.CasadiMeta.version()}"
     if installed != compiled_against:
         raise BackendError(

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from pathwalker_cli.model.backends.functions import SIGNATURES
-from pathwalker_cli.model.backends.topology import JOINT_ENTRIES, POINT_ENTRIES, Topology
-
-__all__ = ["build", "describe"]
+from pathwalker_cli.model.backends.functions import (
+    JOINT_ENTRIES,
+    POINT_ENTRIES,
+    SIGNATURES,
+    Topology,
+)
 
 _PLANE = [0, 2]
 _AXES = ca.SX.eye(3)

@@ -12,8 +12,6 @@ from typing import Any, Protocol
 
 from pathwalker_cli.model.numbers import Number
 
-__all__ = ["ForceElement", "State", "element_forces", "generalised_forces", "plain"]
-
 Curve = Callable[..., Any]
 """Evaluates a scalar function at its arguments, e.g. `plain`, or by a stand-in whose derivatives
 cost less."""
@@ -59,18 +57,12 @@ class ForceElement(Protocol):
     ) -> tuple[Any, ...]:
         """Return its generalised force on each of its coordinates [N, N m].
 
-        Args:
-            state: Coordinates, velocities and activations.
-            numbers: Values of its numbers by address.
-            curve: Evaluates functions that are costly to differentiate, see `Curve`.
+        `numbers` are values by address; `curve` evaluates what is costly to differentiate.
         """
 
 
 def element_forces(
-    elements: Iterable[ForceElement],
-    state: State,
-    numbers: Mapping[str, Any],
-    curve: Curve = plain,
+    elements: Iterable[ForceElement], state: State, numbers: Mapping[str, Any], curve: Curve = plain
 ) -> list[Any]:
     """Return the forces of all elements in a row, each on its coordinates in order [N, N m]."""
     return [force for element in elements for force in element.forces(state, numbers, curve)]

@@ -17,10 +17,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-__all__ = ["BezierChain", "BezierPoint", "SignedCurve", "evaluate", "newton_steps_for"]
-
-_MOST_NEWTON_STEPS = 9
-"""Enough for 1e-14 on every corner in use; the flattest are the eccentric velocity curves."""
+from pathwalker_cli.model.choices import NEWTON_STEPS
 
 
 @dataclass(frozen=True)
@@ -41,7 +38,7 @@ class BezierChain:
     y: Sequence[Any]
     slopes: Sequence[Any]
     curviness: float
-    newton_steps: int = _MOST_NEWTON_STEPS
+    newton_steps: int = NEWTON_STEPS
     corners: Sequence[Any] | None = None
 
     @property
@@ -179,11 +176,11 @@ def newton_steps_for(chain: BezierChain, tolerance: float = 1e-14) -> int:
     controls = np.array([chain.controls(i) for i in range(len(chain.x) - 1)])
     a, b = controls[:, :1], controls[:, 1:]
     u = target + 0 * a
-    for steps in range(1, _MOST_NEWTON_STEPS):
+    for steps in range(1, NEWTON_STEPS):
         u = _newton_step(u, target, a, b)
         if np.abs(_bernstein(u, 0, a, b, 1)[0] - target).max() < tolerance:
             return steps
-    return _MOST_NEWTON_STEPS
+    return NEWTON_STEPS
 
 
 def _step_sums(chain: BezierChain, rows: Sequence[Sequence[Any]], x: Any) -> list[Any]:

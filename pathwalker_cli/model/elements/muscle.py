@@ -22,17 +22,6 @@ from pathwalker_cli.model.elements import Curve, State, plain
 from pathwalker_cli.model.elements.curves import BezierChain, SignedCurve, newton_steps_for
 from pathwalker_cli.model.numbers import Number
 
-__all__ = [
-    "ACTIVATION_TIME",
-    "DEACTIVATION_TIME",
-    "AndersonCurves",
-    "MuscleTorqueGenerator",
-    "activation_rate",
-    "curves_of",
-    "excitation_from_rate",
-    "generators",
-]
-
 ACTIVATION_TIME: Final = 0.011
 """Activation time constant tau_A [s], Winters and Stark (1988)."""
 DEACTIVATION_TIME: Final = 0.068
@@ -106,35 +95,26 @@ def _numeric_chain(x: Any, y: Any, slopes: Any, curviness: float) -> BezierChain
 
 
 _ANDERSON: Final = {
-    "hip_extension": AndersonCurves(0.161, 0.958, 0.932, 1.578, 3.190, 0.242),
-    "hip_flexion": AndersonCurves(0.113, 0.738, -0.214, 2.095, 4.267, 0.218),
-    "knee_extension": AndersonCurves(0.163, 1.258, 1.133, 1.517, 3.952, 0.095),
-    "knee_flexion": AndersonCurves(0.087, 0.869, 0.522, 2.008, 5.233, 0.304),
-    "ankle_extension": AndersonCurves(0.095, 1.391, 0.408, 0.987, 3.558, 0.295),
-    "ankle_flexion": AndersonCurves(0.033, 1.510, -0.187, 0.699, 1.940, 0.828),
+    "hip_extension": (-1.0, 1.0, AndersonCurves(0.161, 0.958, 0.932, 1.578, 3.190, 0.242)),
+    "hip_flexion": (-1.0, -1.0, AndersonCurves(0.113, 0.738, -0.214, 2.095, 4.267, 0.218)),
+    "knee_extension": (1.0, -1.0, AndersonCurves(0.163, 1.258, 1.133, 1.517, 3.952, 0.095)),
+    "knee_flexion": (1.0, 1.0, AndersonCurves(0.087, 0.869, 0.522, 2.008, 5.233, 0.304)),
+    "ankle_extension": (-1.0, 1.0, AndersonCurves(0.095, 1.391, 0.408, 0.987, 3.558, 0.295)),
+    "ankle_flexion": (-1.0, -1.0, AndersonCurves(0.033, 1.510, -0.187, 0.699, 1.940, 0.828)),
 }
-"""Anderson et al. (2007), table 3."""
+"""Signs of the curve's angle and of the torque in the coordinates of `conventions`, and Anderson et
+al. (2007), table 3."""
 
-_SIGNS: Final = {
-    "hip_extension": (-1.0, 1.0),
-    "hip_flexion": (-1.0, -1.0),
-    "knee_extension": (1.0, -1.0),
-    "knee_flexion": (1.0, 1.0),
-    "ankle_extension": (-1.0, 1.0),
-    "ankle_flexion": (-1.0, -1.0),
-}
-"""(sign of the curve's angle, sign of the torque) in the coordinates of `conventions`."""
+
+def _anderson(generator: str) -> tuple[float, float, AndersonCurves]:
+    """Return the row of a generator, e.g. "knee_flexion_l"; the trunk uses those of the hip."""
+    joint, action = generator.split("_")[:2]
+    return _ANDERSON[f"{'hip' if joint == 'lumbar' else joint}_{action}"]
 
 
 def curves_of(generator: str) -> AndersonCurves:
-    """Return the curves of a generator, e.g. "knee_flexion_l"; the trunk uses those of the hip."""
-    return _ANDERSON[_direction(generator)]
-
-
-def _direction(generator: str) -> str:
-    """Return e.g. "hip_extension" for "hip_extension_r" and for "lumbar_extension"."""
-    joint, action = generator.split("_")[:2]
-    return f"{'hip' if joint == 'lumbar' else joint}_{action}"
+    """Return the curves of a generator."""
+    return _anderson(generator)[2]
 
 
 @dataclass(frozen=True)
@@ -211,10 +191,7 @@ class MuscleTorqueGenerator:
 
 def generators() -> tuple[MuscleTorqueGenerator, ...]:
     """Return the 14 generators in the order of `conventions.GENERATORS`."""
-    return tuple(
-        MuscleTorqueGenerator(name, *_SIGNS[_direction(name)], curves_of(name))
-        for name in GENERATORS
-    )
+    return tuple(MuscleTorqueGenerator(name, *_anderson(name)) for name in GENERATORS)
 
 
 def activation_rate(excitation: Any, activation: Any) -> Any:

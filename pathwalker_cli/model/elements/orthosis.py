@@ -7,26 +7,15 @@ References:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, Final
 
+from pathwalker_cli.model.choices import BLEND, CURVINESS, NO_PRELOAD, STEEP
 from pathwalker_cli.model.elements import Curve, State, plain
 from pathwalker_cli.model.elements.curves import BezierChain, evaluate
 from pathwalker_cli.model.numbers import Number
 from pathwalker_cli.model.skeleton import SUFFIX, Side
-
-__all__ = ["AnkleOrthosis", "OrthosisSide", "orthosis_curve", "orthosis_torque"]
-
-_CURVINESS: Final = 0.7
-_BLEND: Final = 0.1
-"""Part of the way from free play to hard stop over which spring and stop are blended."""
-
-_STEEP: Final = 0.5
-"""Stiffness, as a share of 2 tau_0/theta_W, up to which the preload rises with 4 tau_0/theta_W."""
-
-_NO_PRELOAD: Final = 1e-12
-"""Keeps the ratio of an orthosis without preload finite [N m]."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +40,6 @@ class OrthosisSide:
     dorsiflexion_stop_stiffness: Any
     plantarflexion_stop_stiffness: Any
 
-    def scaled(self, share: float) -> OrthosisSide:
-        """Return an orthosis whose preload and stops carry a share of the torque."""
-        names = ("preload_torque", "dorsiflexion_stop_stiffness", "plantarflexion_stop_stiffness")
-        return replace(self, **{name: share * getattr(self, name) for name in names})
-
 
 def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:
     """Return the characteristic curve; the torque on the joint is its negative.
@@ -76,28 +60,28 @@ def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:
     middle, play, preload = side.neutral_angle, side.free_play, side.preload_torque
     reach_d = (middle - play / 2) - side.dorsiflexion_stop
     reach_p = side.plantarflexion_stop - (middle + play / 2)
-    over_d = _BLEND * (preload + reach_d * k_d)
-    over_p = _BLEND * (preload + reach_p * k_p)
+    over_d = BLEND * (preload + reach_d * k_d)
+    over_p = BLEND * (preload + reach_p * k_p)
     steep_d, meeting_d = _preload_rise(play, preload, k_d)
     steep_p, meeting_p = _preload_rise(play, preload, k_p)
     steep = steep_d * steep_p
     stop_d, stop_p = side.dorsiflexion_stop_stiffness, side.plantarflexion_stop_stiffness
     x = [
         side.dorsiflexion_stop - over_d / stop_d,
-        side.dorsiflexion_stop + _BLEND * reach_d,
+        side.dorsiflexion_stop + BLEND * reach_d,
         middle - play,
         middle,
         middle + play,
-        side.plantarflexion_stop - _BLEND * reach_p,
+        side.plantarflexion_stop - BLEND * reach_p,
         side.plantarflexion_stop + over_p / stop_p,
     ]
     y = [
         -preload - reach_d * k_d - over_d,
-        -preload - (1 - _BLEND) * reach_d * k_d,
+        -preload - (1 - BLEND) * reach_d * k_d,
         -preload - play * k_d / 2,
         0.0,
         preload + play * k_p / 2,
-        preload + (1 - _BLEND) * reach_p * k_p,
+        preload + (1 - BLEND) * reach_p * k_p,
         preload + reach_p * k_p + over_p,
     ]
     slopes = [stop_d, k_d, k_d, 2 * (1 + steep) * preload / play, k_p, k_p, stop_p]
@@ -113,21 +97,21 @@ def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:
         (x[4] + x[5]) / 2,
         side.plantarflexion_stop,
     ]
-    return BezierChain(x, y, slopes, _CURVINESS, corners=corners)
+    return BezierChain(x, y, slopes, CURVINESS, corners=corners)
 
 
 def _preload_rise(play: Any, preload: Any, stiffness: Any) -> tuple[Any, Any]:
     """Return how far the rise of the preload is the reference's, s, and s / (1 - r).
 
-    With r = K theta_W / (2 tau_0), s(r) is 1 up to r_0 = `_STEEP`, 0 from 1 on, and a smoothstep
+    With r = K theta_W / (2 tau_0), s(r) is 1 up to r_0 = `STEEP`, 0 from 1 on, and a smoothstep
     of seventh degree between, whose fourfold zero keeps s / (1 - r) C2.
     """
-    ratio = stiffness * play / (2 * preload + _NO_PRELOAD)
-    soft = ratio < _STEEP
+    ratio = stiffness * play / (2 * preload + NO_PRELOAD)
+    soft = ratio < STEEP
     between = (1 - soft) * (ratio < 1)
-    way = between * (ratio - _STEEP) / (1 - _STEEP)
+    way = between * (ratio - STEEP) / (1 - STEEP)
     rest = between * (1 - way) ** 3 * (1 + 4 * way + 10 * way**2 + 20 * way**3)
-    return soft + rest * (1 - way), soft / (1 - soft * ratio) + rest / (1 - _STEEP)
+    return soft + rest * (1 - way), soft / (1 - soft * ratio) + rest / (1 - STEEP)
 
 
 def orthosis_torque(side: OrthosisSide, angle: Any, k_d: Any, k_p: Any) -> Any:
@@ -150,19 +134,11 @@ _NUMBERS: Final = (
     ("preload_torque", "preload_torque", "preload", "N m"),
     ("dorsiflexion_stop", "dorsiflexion_stop", "dorsiflexion stop", "rad"),
     ("plantarflexion_stop", "plantarflexion_stop", "plantarflexion stop", "rad"),
-    (
-        "stop_stiffness.dorsiflexion",
-        "dorsiflexion_stop_stiffness",
-        "dorsiflexion stop stiffness",
-        "N m/rad",
-    ),
-    (
-        "stop_stiffness.plantarflexion",
-        "plantarflexion_stop_stiffness",
-        "plantarflexion stop stiffness",
-        "N m/rad",
-    ),
-)
+    ("stop_stiffness.dorsiflexion", "dorsiflexion_stop_stiffness",
+     "dorsiflexion stop stiffness", "N m/rad"),
+    ("stop_stiffness.plantarflexion", "plantarflexion_stop_stiffness",
+     "plantarflexion stop stiffness", "N m/rad"),
+)  # fmt: skip
 """Place below `orthosis` in the patient's file, name, label and unit of every number: both springs,
 then the fields of `OrthosisSide`."""
 
@@ -199,12 +175,16 @@ class AnkleOrthosis:
 
     def fixed(self, numbers: Mapping[str, Any]) -> OrthosisSide:
         """Return all but the springs, from numbers by address."""
-        return OrthosisSide(*(numbers[number.address] for number in self.numbers[2:]))
+        values = self._by_name(numbers)
+        return OrthosisSide(**{field.name: values[field.name] for field in fields(OrthosisSide)})
 
     def springs(self, numbers: Mapping[str, Any]) -> tuple[Any, Any]:
         """Return K_D and K_P [N m/rad], from numbers by address."""
-        k_d, k_p = (numbers[number.address] for number in self.numbers[:2])
-        return k_d, k_p
+        values = self._by_name(numbers)
+        return values["dorsiflexion_stiffness"], values["plantarflexion_stiffness"]
+
+    def _by_name(self, numbers: Mapping[str, Any]) -> dict[str, Any]:
+        return {number.name: numbers[number.address] for number in self.numbers}
 
     def forces(
         self, state: State, numbers: Mapping[str, Any], curve: Curve = plain

@@ -25,8 +25,6 @@ from pathwalker_cli.stride.figures.style import (
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import own_cycle
 
-__all__ = ["activations"]
-
 _DIRECTIONS = ("extension", "flexion")
 
 

@@ -26,8 +26,6 @@ from pathwalker_cli.stride.measures import ankle_torque_line
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import stride_of, toe_bearing
 
-__all__ = ["ankle_torque", "orthosis_curves"]
-
 _ANGLE = "dorsiflexion [deg]"
 _TORQUE = "plantarflexing torque [N m]"
 

@@ -14,8 +14,6 @@ from pathwalker_cli.stride.figures.style import LINE_COLOUR, LINE_STYLE, toe_off
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import own_cycle
 
-__all__ = ["CLINICAL_ANGLE", "EXTENSION", "Band", "Reference", "draw_band", "draw_sides"]
-
 CLINICAL_ANGLE: Final = {"hip": -1.0, "knee": 1.0, "ankle": -1.0}
 """Sign that makes flexion and dorsiflexion angles positive, as clinicians plot them."""
 EXTENSION: Final = {"hip": 1.0, "knee": -1.0, "ankle": 1.0}

@@ -20,8 +20,6 @@ from pathwalker_cli.stride.figures.style import (
 )
 from pathwalker_cli.stride.series import GaitSeries
 
-__all__ = ["ground_forces"]
-
 _PANELS: Final = {
     "z": ("Vertical, up +", "vertical force [% body weight]"),
     "x": ("Fore-aft, forward +", "fore-aft force [% body weight]"),

@@ -13,8 +13,6 @@ from matplotlib.figure import Figure
 
 from pathwalker_cli.stride.figures.style import STYLE
 
-__all__ = ["inline_svg"]
-
 _SVG: Final = "http://www.w3.org/2000/svg"
 _HREF: Final = "{http://www.w3.org/1999/xlink}href"
 _LOCAL: Final = re.compile(r"url\(#([^)]+)\)")

@@ -25,8 +25,6 @@ from pathwalker_cli.stride.figures.style import (
 )
 from pathwalker_cli.stride.series import GaitSeries
 
-__all__ = ["joint_angles"]
-
 _PANELS: Final = {
     "pelvis_tilt": ("Pelvis", "forward tilt [deg]"),
     "hip": ("Hip", "flexion [deg]"),

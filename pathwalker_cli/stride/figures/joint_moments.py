@@ -26,8 +26,6 @@ from pathwalker_cli.stride.figures.style import (
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import own_cycle
 
-__all__ = ["joint_moments"]
-
 _TITLES: Final = {
     "hip": "Hip, extension +",
     "knee": "Knee, extension +",

@@ -20,8 +20,6 @@ from pathwalker_cli.stride.figures.stick_figures import stick_figures
 from pathwalker_cli.stride.figures.style import STYLE
 from pathwalker_cli.stride.series import GaitSeries
 
-__all__ = ["FIGURES", "figure_names", "make_figure", "save_figure", "save_figures", "save_formats"]
-
 FORMATS: Final = ("png", "svg")
 """What every figure is saved as."""
 

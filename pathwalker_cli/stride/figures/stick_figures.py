@@ -24,8 +24,6 @@ from pathwalker_cli.stride.figures.style import (
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import body_points, centre_of_pressure, loaded, stride_of
 
-__all__ = ["stick_figures"]
-
 _ROWS: Final = ((0, 10, 20, 30, 40), (50, 60, 70, 80, 90))
 """Positions in the right gait cycle [%] of the figures in each row."""
 _SPACING: Final = 1.05

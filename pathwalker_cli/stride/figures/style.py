@@ -14,30 +14,6 @@ from matplotlib.patches import Patch
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.stride.stride import OwnCycle
 
-__all__ = [
-    "BODY_COLOUR",
-    "COLUMN",
-    "FORCE_COLOUR",
-    "FORCE_LENGTH",
-    "LINE_COLOUR",
-    "LINE_STYLE",
-    "MARKER",
-    "NEUTRAL",
-    "STYLE",
-    "TEXT",
-    "band_handle",
-    "dress",
-    "events_handle",
-    "legend",
-    "legend_panel",
-    "new_figure",
-    "percent_axis",
-    "side_handles",
-    "side_look",
-    "toe_off_line",
-    "zero_line",
-]
-
 COLUMN: Final = 3.35
 """Width of every figure [in]: a column of a journal, 85 mm."""
 TEXT: Final = 7.0

@@ -13,8 +13,7 @@ from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig, find_config, load_config, place_of, with_values
 from pathwalker_cli.errors import ConfigError, InputError, PatientError, placed
 from pathwalker_cli.gait.bounds import gait_bounds
-from pathwalker_cli.gait.passage import recorded_passage
-from pathwalker_cli.gait.start import recorded_stride, start_recording
+from pathwalker_cli.gait.recorded import recorded_passage, recorded_stride, start_recording
 from pathwalker_cli.gait.symmetry import require_symmetry
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.patient import Patient, load_patient, shipped_patients
@@ -29,17 +28,6 @@ from pathwalker_cli.studies.batch.schema import (
     short_keys,
     slug,
 )
-
-__all__ = [
-    "Batch",
-    "BatchCase",
-    "check_case",
-    "check_patient",
-    "check_warm_start",
-    "listed_patients",
-    "listed_problems",
-    "load_cases",
-]
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,6 @@ from typing import Any, Final
 from pathwalker_cli.errors import BackendError, ConfigError
 from pathwalker_cli.studies.batch.worker import LOST, Result, Task, Work, failure
 
-__all__ = ["INSTALL", "DaskPool", "connected", "slurm_jobs"]
-
 INSTALL: Final = 'pip install "pathwalker-cli[cluster]"'
 
 PATIENCE: Final = 10.0

@@ -22,20 +22,6 @@ from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.worker import Result
 from pathwalker_cli.studies.run import done_run
 
-__all__ = [
-    "CASES",
-    "CONVERGED",
-    "ENTRIES",
-    "PENDING",
-    "TABLE",
-    "CaseTable",
-    "Ended",
-    "Ledger",
-    "numbers_of",
-    "read_metrics",
-    "unit_of",
-]
-
 CONVERGED: Final = "converged"
 PENDING: Final = "not yet run"
 """Status of a case whose turn has not come."""

@@ -14,17 +14,8 @@ from pydantic import Field, field_validator, model_validator
 from pathwalker_cli.config import StudyConfig, apply_change, read_config
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import YamlModel, invalid
-from pathwalker_cli.io.yaml_file import KeyPath, read_value
-
-__all__ = [
-    "BatchStudy",
-    "NamedCase",
-    "case_name",
-    "flat",
-    "load_batch",
-    "short_keys",
-    "slug",
-]
+from pathwalker_cli.io.refusals import KeyPath
+from pathwalker_cli.io.yaml_file import read_value
 
 _DOTTED: Final = ("set", "grid", "warm_start")
 """Keys whose own keys may hold dots."""

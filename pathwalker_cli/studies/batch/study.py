@@ -17,15 +17,6 @@ from pathwalker_cli.studies.batch.cases import BatchCase
 from pathwalker_cli.studies.batch.ledger import CASES, ENTRIES, TABLE, Ended, Ledger
 from pathwalker_cli.studies.batch.worker import Pool, Task, Work, solve_case
 
-__all__ = [
-    "Report",
-    "Watch",
-    "failure_sentence",
-    "report_content",
-    "report_text",
-    "run_batch",
-]
-
 
 class Watch:
     """Hears how a study goes on; this one keeps it to itself."""

@@ -25,17 +25,6 @@ from pathwalker_cli.nlp.machine import use_one_blas_thread
 if TYPE_CHECKING:
     from pathwalker_cli.case import Case
 
-__all__ = [
-    "LOST",
-    "LocalPool",
-    "Pool",
-    "Result",
-    "Task",
-    "Work",
-    "failure",
-    "solve_case",
-]
-
 LOST: Final = "its worker died every time it was tried"
 """Reason of a case that took its workers with it."""
 

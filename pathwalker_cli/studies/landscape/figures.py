@@ -24,8 +24,6 @@ from pathwalker_cli.stride.figures.style import STYLE, legend, legend_panel, new
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.landscape.result import Landscape
 
-__all__ = ["Chosen", "cost_figure", "landscape_figure", "save_landscape_figure"]
-
 Chosen = Mapping[Side, tuple[float, float]]
 """K_D and K_P by side [N m/rad]."""
 

@@ -9,8 +9,6 @@ from typing import Final
 
 import numpy as np
 
-__all__ = ["ROOT", "Landscape", "Point", "Region", "region_of"]
-
 ROOT: Final = "optimum"
 """Name of the point that everything begins with: the springs of the optimum."""
 

@@ -13,8 +13,6 @@ from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.studies.landscape.result import Landscape, Point, Region
 from pathwalker_cli.studies.measures import measures_with
 
-__all__ = ["FILES", "landscape_content", "landscape_lines", "write_tables"]
-
 FILES: Final = ("landscape.csv", "landscape.json")
 
 

@@ -28,8 +28,6 @@ from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
 
-__all__ = ["perturbation_figure", "save_perturbation_figure"]
-
 _TITLE: Final = 20
 """Characters of the longest line of a title."""
 _LEAST_SPAN: Final = 0.02

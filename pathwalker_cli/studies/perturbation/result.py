@@ -17,18 +17,6 @@ from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.measures import COMPARED, Ranges, range_content
 
-__all__ = [
-    "FILES",
-    "Perturbation",
-    "Perturbed",
-    "paper_changes",
-    "perturbation_content",
-    "perturbation_lines",
-    "remark",
-    "verdict",
-    "write_tables",
-]
-
 FILES: Final = ("perturbation.csv", "perturbation.json")
 
 _PAPER_PROBLEM: Final = "mapd-orthosis"

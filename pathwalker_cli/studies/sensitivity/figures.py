@@ -14,8 +14,6 @@ from pathwalker_cli.stride.figures.style import NEUTRAL, STYLE, dress, new_figur
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.sensitivity.result import Sensitivities, label_of
 
-__all__ = ["save_sensitivity_figure", "sensitivity_figure"]
-
 _PANELS: Final = (
     "cost",
     "min_stance_knee_flexion_right",

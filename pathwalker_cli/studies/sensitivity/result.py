@@ -13,18 +13,6 @@ from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measure_of, measures_in
 
-__all__ = [
-    "FILES",
-    "Check",
-    "Sensitivities",
-    "Sensitivity",
-    "agreement",
-    "label_of",
-    "sensitivity_content",
-    "sensitivity_lines",
-    "write_sensitivities",
-]
-
 FILES: Final = ("sensitivity.csv", "sensitivity_check.csv", "sensitivity.json")
 
 _LABEL, _CELL = 41, 9

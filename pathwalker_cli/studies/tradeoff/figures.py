@@ -27,8 +27,6 @@ from pathwalker_cli.stride.figures.style import (
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
-__all__ = ["save_tradeoff_figure", "tradeoff_figure"]
-
 _MARKER: Final = {"dorsiflexion": "o", "plantarflexion": "s"}
 _SPEED: Final = "walking speed [m/s]"
 _NEAR: Final = 0.01

@@ -15,18 +15,6 @@ from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.studies.measures import measures_with
 
-__all__ = [
-    "FILES",
-    "FrontPoint",
-    "Tradeoff",
-    "front_of",
-    "judged",
-    "tradeoff_content",
-    "tradeoff_lines",
-    "tradeoff_of_content",
-    "write_tables",
-]
-
 FILES: Final = ("tradeoff.csv", "tradeoff.json")
 
 _EQUAL: Final = 1e-3

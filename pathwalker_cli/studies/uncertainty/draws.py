@@ -20,8 +20,6 @@ from pathwalker_cli.io.fields import Quantity, YamlModel, invalid
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.variation import Variation, varied
 
-__all__ = ["Distribution", "Draws", "Input", "draw", "inputs_of"]
-
 _TRUNCATION: Final = 3.0
 """Standard deviations at which normal and lognormal distributions end: no absurd patients."""
 

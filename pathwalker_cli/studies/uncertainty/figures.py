@@ -30,8 +30,6 @@ from pathwalker_cli.stride.figures.style import (
 from pathwalker_cli.studies.measures import Ranges
 from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
 
-__all__ = ["correlation_figure", "save_uncertainty_figures", "spread_figure"]
-
 _STRIP: Final = 0.22
 """Half the height over which points of a row are scattered, so that equal ones can be told."""
 

@@ -24,19 +24,6 @@ from pathwalker_cli.studies.measures import Ranges, range_content
 from pathwalker_cli.studies.neighbours import Solved
 from pathwalker_cli.studies.uncertainty.draws import Draws, Input
 
-__all__ = [
-    "FILES",
-    "Spread",
-    "Uncertainty",
-    "chance_level",
-    "rank_correlations",
-    "shown_text",
-    "spreads",
-    "uncertainty_content",
-    "uncertainty_lines",
-    "write_tables",
-]
-
 FILES: Final = ("draws.csv", "uncertainty.csv", "correlations.csv", "uncertainty.json")
 
 _DIGITS: Final = {"N m/rad": 1, "deg": 1, "m": 3, "m/s": 3, "s": 3, "s/m": 3, "": 4}

@@ -1,0 +1,21 @@
+"""Every numerical choice of this room, with its reason."""
+
+from __future__ import annotations
+
+from typing import Final
+
+UNIT_SIZES: Final = {"N m/rad": 50.0, "N m": 10.0, "rad": 0.1, "kg": 1.0, "m": 0.1}
+"""What counts as 1 for the solver, by unit; for stiffnesses prototypes needed the fewest
+iterations with this, the others are of the size of the numbers themselves."""
+
+NEWTON_STEPS: Final = 9
+"""Enough for 1e-14 on every corner in use; the flattest are the eccentric velocity curves."""
+
+# Shape of the orthosis' curve.
+CURVINESS: Final = 0.7
+BLEND: Final = 0.1
+"""Part of the way from free play to hard stop over which spring and stop are blended."""
+STEEP: Final = 0.5
+"""Stiffness, as a share of 2 tau_0/theta_W, up to which the preload rises with 4 tau_0/theta_W."""
+NO_PRELOAD: Final = 1e-12
+"""Keeps the ratio of an orthosis without preload finite [N m]."""
