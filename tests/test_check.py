@@ -421,7 +421,7 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     ),
     "a trade-off of a fit": (
         lambda f: text_of(f, "base: ls-barefoot\nwalking_speed_weights: [0.0, 1.0]\n"),
-        ("study.yaml: base", "follows a recording"),
+        ("study.yaml, base", "follows a recording"),
     ),
     "a study of a base that is not there": (
         lambda f: text_of(f, "base: nowhere.yaml\nfactors: [0.9]\n"),
