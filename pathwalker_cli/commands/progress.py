@@ -99,11 +99,11 @@ class Progress(RunLog):
             self._drawn = now
             self._live.update(Text(self._last, no_wrap=True, overflow="crop"), refresh=True)
 
-    def optimum(self, found: LocalOptimum) -> None:
+    def optimum(self, end: LocalOptimum) -> None:
         """Take note of where one of several starts ended."""
         self._begin()
         self._end_stage()
-        super().optimum(found)
+        super().optimum(end)
         self._last = self.lines[-1]
         self._print()
 

@@ -116,32 +116,25 @@ class StudyKind(Generic[Study, Result]):
         Raises:
             ConfigError: If it lacks what is varied, or its neighbours cannot be solved.
         """
-        freed = self.varies == "numbers" and config.free
-        if self.varies and config.condition != "orthosis" and not freed:
-            raise ConfigError(
-                f"{config.problem} is walked barefoot and has no springs",
-                where=where,
-                allowed="a problem with orthoses, e.g. mapd-orthosis",
-            )
-        if config.transcription != _TRANSCRIPTION:
-            raise ConfigError(
-                f"is solved by {config.transcription}, but neighbours are solved by "
-                f"{_TRANSCRIPTION}",
-                where=where,
-                mend=f"solve it with transcription: {_TRANSCRIPTION}",
-            )
-        if self.predicts and config.fits:
-            raise ConfigError(
-                f"is {config.problem}, which follows a recording",
-                where=where,
-                allowed="a prediction, e.g. mapd-orthosis",
-            )
-        if self.whole_cycle and config.half_cycle:
-            raise ConfigError(
-                "is solved as half a cycle, in which the numbers of one side cannot change alone",
-                where=where,
-                mend="solve it with half_cycle: false",
-            )
+        springless = config.condition != "orthosis" and not (
+            self.varies == "numbers" and config.free
+        )
+        refusals = (
+            (bool(self.varies) and springless,
+             f"{config.problem} is walked barefoot and has no springs",
+             "a problem with orthoses, e.g. mapd-orthosis", ""),
+            (config.transcription != _TRANSCRIPTION,
+             f"is solved by {config.transcription}, but neighbours are solved by {_TRANSCRIPTION}",
+             "", f"solve it with transcription: {_TRANSCRIPTION}"),
+            (self.predicts and config.fits, f"is {config.problem}, which follows a recording",
+             "a prediction, e.g. mapd-orthosis", ""),
+            (self.whole_cycle and config.half_cycle,
+             "is solved as half a cycle, in which the numbers of one side cannot change alone",
+             "", "solve it with half_cycle: false"),
+        )  # fmt: skip
+        for refused, what, allowed, mend in refusals:
+            if refused:
+                raise ConfigError(what, where=where, allowed=allowed, mend=mend)
 
 
 def load_study(path: str | Path, model: type[Study], changes: tuple[str, ...] = ()) -> Study:

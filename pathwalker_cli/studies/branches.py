@@ -19,7 +19,7 @@ Values = tuple[float, ...]
 
 
 class Solved(Protocol):
-    """What the end of a solve must tell."""
+    """What must be known of the end of a solve."""
 
     @property
     def cost(self) -> float:

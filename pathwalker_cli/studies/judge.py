@@ -153,19 +153,19 @@ class _Judge:
         ]
         choices = [dict(zip(springs, choice, strict=True)) for choice in itertools.product(*lists)]
         best = min(choices, key=self._estimate)
-        found = self._solved({u: spring.stiffness for u, spring in best.items()})
+        end = self._solved({u: spring.stiffness for u, spring in best.items()})
         self.solves += 1
         rise = self._estimate(best)
-        if found.converged:
-            rise = found.cost - self.optimum.cost
-        series = found.series
+        if end.converged:
+            rise = end.cost - self.optimum.cost
+        series = end.series
         each = {name: spring for u, spring in best.items() for name in _full_names(u)}
         return SnappedSprings(
             {name: spring.name for name, spring in each.items()},
             {name: spring.stiffness for name, spring in each.items()},
             rise / abs(self.optimum.cost),
             series.distance / series.duration,
-            found.result.status,
+            end.result.status,
         )
 
     def _estimate(self, choice: Mapping[Unknown, RealSpring]) -> float:
@@ -296,16 +296,16 @@ def find_edge(
                 trial = limit
         else:
             trial = _between(search, share)
-        found = solve(trial, search.inside, True)
+        end = solve(trial, search.inside, True)
         search.solves += 1
-        search.iterations += found.result.iterations
-        if not found.converged:
+        search.iterations += end.result.iterations
+        if not end.converged:
             step = abs(trial - search.at) / 2.0
             search.outside = None
             continue
-        rise = (found.cost - optimum.cost) / size
+        rise = (end.cost - optimum.cost) / size
         if rise <= share * (1.0 + _NEAR):
-            search.inside, search.at, search.rise = found, trial, rise
+            search.inside, search.at, search.rise = end, trial, rise
             step = max(step, 2.0 * abs(trial - start))
         else:
             search.outside, search.outside_rise = trial, rise
@@ -322,9 +322,9 @@ def _looked_beyond(
     edge: Edge, solve: Solve, optimum: Optimum, inside: Optimum, limit: float, share: float
 ) -> Edge:
     """Return an edge inside the range, after one look at the limit."""
-    found = solve(limit, inside, False)
-    again = found.converged and found.cost - optimum.cost <= share * abs(optimum.cost)
-    iterations = edge.iterations + found.result.iterations
+    end = solve(limit, inside, False)
+    again = end.converged and end.cost - optimum.cost <= share * abs(optimum.cost)
+    iterations = edge.iterations + end.result.iterations
     return replace(edge, again=again, solves=edge.solves + 1, iterations=iterations)
 
 

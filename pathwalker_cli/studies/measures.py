@@ -30,10 +30,10 @@ def all_measures(optimum: Optimum) -> dict[str, float]:
 
 
 def measures(optimum: Optimum) -> dict[str, float]:
-    """Return the measures that every study tells, then free numbers that are no springs."""
+    """Return the measures that every study shows, then free numbers that are no springs."""
     numbers, unknowns = all_measures(optimum), optimum.series.walker.unknowns
-    told = {m.key: numbers[m.key] for m in measures_in("studies") if m.key in numbers}
-    return told | {u.name: optimum.value(u) for u in unknowns if u.name not in STIFFNESSES}
+    known = {m.key: numbers[m.key] for m in measures_in("studies") if m.key in numbers}
+    return known | {u.name: optimum.value(u) for u in unknowns if u.name not in STIFFNESSES}
 
 
 def free_units(unknowns: Sequence[Unknown]) -> dict[str, str]:
@@ -42,7 +42,7 @@ def free_units(unknowns: Sequence[Unknown]) -> dict[str, str]:
 
 
 def measures_with(units: Mapping[str, str]) -> tuple[Measure, ...]:
-    """Return the measures that every study tells, then free numbers by name and SI unit."""
+    """Return the measures that every study shows, then free numbers by name and SI unit."""
     words = {name: name.replace("_", " ") for name in units}
     free = (Measure(name, words[name], unit, "", None) for name, unit in units.items())
     return (*measures_in("studies"), *free)

@@ -54,11 +54,11 @@ class RunLog:
             f"infeasibility {report.infeasibility:.1e}   {elapsed:6.1f} s"
         )
 
-    def optimum(self, found: LocalOptimum) -> None:
+    def optimum(self, end: LocalOptimum) -> None:
         """Take note of where one of several starts ended."""
         self.lines.append(
-            f"start {found.start:<3d} {found.status}, cost {found.cost:.5g}, "
-            f"{found.walking_speed:.3f} m/s, {found.iterations} iterations, {found.description}"
+            f"start {end.start:<3d} {end.status}, cost {end.cost:.5g}, "
+            f"{end.walking_speed:.3f} m/s, {end.iterations} iterations, {end.description}"
         )
 
 
@@ -74,7 +74,7 @@ def run_study(
         study: The study; the patient of a config is read now.
         folder: The run folder; an earlier run in it is replaced.
         warm_start: Folder of an earlier run to begin with.
-        log: Is told of every iteration.
+        log: Hears every iteration.
 
     Raises:
         DataError: If the folder holds something else, or the earlier run cannot be used; if the

@@ -158,15 +158,15 @@ def _warm_starts(
     study: BatchStudy, problems: Mapping[str, StudyConfig], source: Path, where: str
 ) -> dict[str, Path]:
     """Return the folder of the run that the cases of each problem begin with."""
-    found = {}
+    folders = {}
     for name, folder in study.warm_start.items():
         place = f"{where}: warm_start.{name}"
         if name not in problems:
             raise ConfigError("is no problem of this study", where=place,
                               allowed=", ".join(problems))  # fmt: skip
-        found[name] = (source.parent / folder).resolve()
-        check_warm_start(found[name], problems[name], place)
-    return found
+        folders[name] = (source.parent / folder).resolve()
+        check_warm_start(folders[name], problems[name], place)
+    return folders
 
 
 def listed_patients(
@@ -184,20 +184,20 @@ def listed_patients(
         ConfigError: If an entry leads to nobody, or to somebody who is there already.
         PatientError: If the file of a patient is refused.
     """
-    found: dict[str, Patient] = {}
+    patients: dict[str, Patient] = {}
     owners: dict[str, str] = {}
     for entry in entries:
         for name in _names(entry, folder, source, f"{where}: patients"):
             patient = load_patient(name)
-            if name in found:
+            if name in patients:
                 what = f"'{entry}' leads to {name}, which is listed already"
                 raise ConfigError(what, where=f"{where}: patients", mend="list it once")
             if patient.id in owners:
                 what = f"{name} and {owners[patient.id]} have the same id, {patient.id}"
                 mend = "give one of them another id"
                 raise ConfigError(what, where=f"{where}: patients", mend=mend)
-            found[name], owners[patient.id] = patient, name
-    return found
+            patients[name], owners[patient.id] = patient, name
+    return patients
 
 
 def _names(entry: str, folder: Path, source: Path, where: str) -> Iterator[str]:
@@ -239,7 +239,7 @@ def listed_problems(entries: tuple[str, ...], folder: Path, where: str) -> dict[
     Raises:
         ConfigError: If a config is missing or refused, or a name stands twice.
     """
-    found: dict[str, StudyConfig] = {}
+    problems: dict[str, StudyConfig] = {}
     for entry in entries:
         beside = folder / entry
         path = beside if beside.is_file() else find_config(Path(entry))
@@ -250,14 +250,14 @@ def listed_problems(entries: tuple[str, ...], folder: Path, where: str) -> dict[
                 allowed=f"{', '.join(PROBLEMS)}, or a YAML file relative to the study's file",
             )
         name = slug(path.stem)
-        if name in found:
+        if name in problems:
             raise ConfigError(
                 f"two problems are named {name}",
                 where=f"{where}: problems",
                 mend="list one of them, or rename its file",
             )
-        found[name] = load_config(path)
-    return found
+        problems[name] = load_config(path)
+    return problems
 
 
 def check_case(name: str, case: Case, where: str) -> None:

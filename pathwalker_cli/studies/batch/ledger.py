@@ -74,10 +74,10 @@ def numbers_of(status: str, metrics: Mapping[str, Any] | None) -> dict[str, str]
         status: "converged", or why not.
         metrics: Content of the run's `metrics.json`; None if there is no run.
     """
-    found = metrics or {}
-    gait = found if status == CONVERGED else {}  # a last iterate is no gait
+    known = metrics or {}
+    gait = known if status == CONVERGED else {}  # a last iterate is no gait
     numbers = {m.key: gait.get(m.key) for m in measures_in("batch")}
-    numbers |= {name: found.get(name) for name in _PROOF}
+    numbers |= {name: known.get(name) for name in _PROOF}
     return {name: _number(value) for name, value in numbers.items()}
 
 
@@ -122,8 +122,8 @@ def _unit(annotation: Any, path: list[str]) -> str:
         return _below(annotation, path)
     inner = get_args(annotation)
     steps = path[1:] if getattr(annotation, "__origin__", None) is dict else path
-    found = (_unit(argument, steps) for argument in inner)
-    return next((unit for unit in found if unit), "")
+    units = (_unit(argument, steps) for argument in inner)
+    return next((unit for unit in units if unit), "")
 
 
 def _below(model: type[BaseModel], path: list[str]) -> str:

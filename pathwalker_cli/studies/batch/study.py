@@ -19,7 +19,7 @@ from pathwalker_cli.studies.batch.worker import Pool, Task, Work, solve_case
 
 
 class Watch:
-    """Is told how a study goes on; this one keeps it to itself."""
+    """Hears how a study goes on; this one keeps it to itself."""
 
     def begin(self, total: int, kept: int, workers: int | None) -> None:
         """Take note of the number of cases, of those that were done before, and of workers."""
@@ -55,7 +55,7 @@ def run_batch(
         cases: The cases in order.
         folder: Folder of the study.
         pool: Who solves them.
-        watch: Is told of every case.
+        watch: Hears of every case.
         work: Solves one case.
 
     Raises:

@@ -18,7 +18,6 @@ from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.model.numbers import Unknown
-from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import NeighbourStudy, Plan, StudyKind, Work
@@ -255,7 +254,7 @@ def _result(
     """Return an exploration as plain numbers, with proofs of some of its points."""
     points, mesh = tuple(_points(graph, explored)), near.run.config.mesh
     best = min((p for p in points if p.branch == 1), key=lambda p: p.cost)
-    start = _point(ROOT, graph.points[ROOT], near.optimum.result, measures(near.optimum))
+    start = _point(ROOT, graph.points[ROOT], near.optimum)
     differs = study.side != "both" and best.cost < start.cost - _BETTER * abs(start.cost)
     attempts = [attempt.end.result for attempt in explored.attempts]
     return Landscape(
@@ -296,30 +295,23 @@ def _released(near: Neighbours, side: str, best: Point, explored: Exploration[Op
     end = near.resolve("released", near.run.case, None if branch is None else branch.end)
     numbers = measures(end) if end.converged else {}
     springs = tuple(numbers.get(f"{kind}_stiffness_{side}", float("nan")) for kind in _KINDS)
-    return _point("released", springs, end.result, numbers)
+    return _point("released", springs, end)
 
 
 def _points(graph: Graph, explored: Exploration[Optimum]) -> Iterator[Point]:
     """Yield every local optimum of every point, best first; one entry where all failed."""
     for name, values in graph.points.items():
         for rank, branch in enumerate(explored.branches[name], start=1):
-            end = branch.end
-            yield _point(name, values, end.result, measures(end), rank, branch.times)
+            yield _point(name, values, branch.end, rank, branch.times)
         if not explored.branches[name]:
-            last = [a.end.result for a in explored.attempts if a.point == name][-1]
-            yield _point(name, values, last, {}, branch=0)
+            last = [attempt.end for attempt in explored.attempts if attempt.point == name][-1]
+            yield _point(name, values, last, branch=0)
 
 
-def _point(
-    name: str,
-    values: Values,
-    result: NlpResult,
-    numbers: dict[str, float],
-    branch: int = 1,
-    times: int = 1,
-) -> Point:
+def _point(name: str, values: Values, end: Optimum, branch: int = 1, times: int = 1) -> Point:
     """Return the end of a solve as plain numbers."""
-    k_d, k_p = values
+    (k_d, k_p), result = values, end.result
+    numbers = measures(end) if end.converged else {}
     return Point(name, k_d, k_p, branch, result.status, result.iterations, result.seconds, numbers,
                  times)  # fmt: skip
 

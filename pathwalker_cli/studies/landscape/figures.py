@@ -138,13 +138,13 @@ def _mark(ax: Axes, landscape: Landscape) -> None:
 
 def _article(landscape: Landscape) -> dict[str, tuple[float, float]]:
     """Return what the article identified for its patient, by side [N m/rad]."""
-    found = {}
+    identified = {}
     for side in SIDES if landscape.side == "both" else (landscape.side,):
         pair = [paper_number("mapd-orthosis", f"{kind}_stiffness_{side}")
                 for kind in ("dorsiflexion", "plantarflexion")]  # fmt: skip
         if landscape.patient == PATIENT and pair[0] is not None and pair[1] is not None:
-            found[side] = (pair[0].value, pair[1].value)
-    return found
+            identified[side] = (pair[0].value, pair[1].value)
+    return identified
 
 
 def _draw_measure(fig: Figure, ax: Axes, landscape: Landscape, key: str) -> None:
@@ -220,11 +220,11 @@ def _handles(landscape: Landscape) -> list[Artist]:
         (_RING, "several local optima,\nbest shown", bool(landscape.branched)),
         (_CROSS, "no solution", bool(landscape.failed)),
     ]
-    found: list[Artist] = [
+    handles: list[Artist] = [
         Line2D([], [], linestyle="none", label=label, **marker)
         for marker, label, there in entries
         if there
     ]
     text = f"at most {100 * landscape.tolerance:g} % above\nthe least"
     return [Patch(facecolor="none", edgecolor="black", hatch="///", linewidth=1.5, label=text),
-            *found]  # fmt: skip
+            *handles]  # fmt: skip

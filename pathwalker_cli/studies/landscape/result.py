@@ -116,12 +116,12 @@ class Landscape:
     @cached_property
     def bests(self) -> dict[tuple[int, int], Point]:
         """Best local optimum, or failure, by place on the grid."""
-        found = {}
+        places = {}
         for point in self.points:
             i, j = np.flatnonzero(self.k_d == point.k_d), np.flatnonzero(self.k_p == point.k_p)
             if i.size and j.size and point.name != ROOT and point.branch <= 1:
-                found[int(i[0]), int(j[0])] = point
-        return found
+                places[int(i[0]), int(j[0])] = point
+        return places
 
     def values(self, key: str) -> np.ndarray:
         """Return a measure of the best local optima, NaN where there is none, shape (n, m)."""
@@ -192,10 +192,10 @@ def region_of(
 
 def _extent(axis: np.ndarray, increase: np.ndarray, tolerance: float) -> tuple[float, float]:
     """Return least and largest value of the first axis at which some line is in the region."""
-    found = list(axis[(increase <= tolerance).any(axis=1)])
+    edges = list(axis[(increase <= tolerance).any(axis=1)])
     above = increase - tolerance
     for i in range(axis.size - 1):
         for a, b in zip(above[i], above[i + 1], strict=True):
             if a * b < 0.0:  # NaN compares false
-                found.append(axis[i] + (axis[i + 1] - axis[i]) * a / (a - b))
-    return float(min(found)), float(max(found))
+                edges.append(axis[i] + (axis[i + 1] - axis[i]) * a / (a - b))
+    return float(min(edges)), float(max(edges))

@@ -176,7 +176,7 @@ def _proof(landscape: Landscape) -> Iterator[tuple[str, str]]:
         where = _places(landscape, landscape.rough)
         yield "", f"the mesh of the base is too coarse at {where}: {limits} are allowed"
     points, failed, several = (
-        len(found) for found in (landscape.bests, landscape.failed, landscape.branched)
+        len(some) for some in (landscape.bests, landscape.failed, landscape.branched)
     )
     yield "points", f"{points}: {failed} without a solution, {several} with several local optima"
     done = "found nothing new" if landscape.complete else "still found new optima"

@@ -203,9 +203,9 @@ def write_tables(tradeoff: Tradeoff, folder: Path) -> None:
 
 def tradeoff_lines(tradeoff: Tradeoff) -> list[str]:
     """Return the table and what it took, line by line."""
-    worn = bool(tradeoff.springs)
-    heading = ["weight", "speed", "effort", *(["K_D r", "K_D l", "K_P r", "K_P l"] * worn)]
-    units = ["s^2/m^2", "m/s", "s/m", *(["N m/rad"] * 4 * worn)]
+    with_springs = bool(tradeoff.springs)
+    heading = ["weight", "speed", "effort", *(["K_D r", "K_D l", "K_P r", "K_P l"] * with_springs)]
+    units = ["s^2/m^2", "m/s", "s/m", *(["N m/rad"] * 4 * with_springs)]
     lines = ["".join(f"{cell:>9}" for cell in row) for row in (heading, units)]
     lines += [_line(tradeoff, point) for point in tradeoff.points]
     return [*lines, "", *(f"{label:<22}{text}" for label, text in _notes(tradeoff))]
