@@ -72,7 +72,7 @@ def run(folder: Path, *words: str) -> str:
 
 
 def test_every_addition_takes_one_or_two_files() -> None:
-    sections = PAGE.read_text(encoding="utf-8").split("\n## ")[2:-1]
+    sections = PAGE.read_text(encoding="utf-8").split("\n## ")[2:-2]
     assert len(sections) == 5
     for section in sections:
         files = {file for _, _, file in blocks(section) if file}

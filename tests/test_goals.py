@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -171,3 +172,20 @@ def test_goals_that_cannot_be_are_refused(
 def test_ranges_are_of_coordinates_that_are_angles() -> None:
     assert "pelvis_tz" not in ANGLES
     assert len(ANGLES) == 8
+
+
+def test_goals_see_rates_and_accelerations_after_a_solve_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = {}
+
+    def look(point: Instant) -> tuple[Any, ...]:
+        seen.update(rate=point.rate, vdot=point.vdot, excitation=point.excitation)
+        return (point.vdot[1] ** 2 + point.rate[0] ** 2,)
+
+    term = replace(GOALS["crouch"], integrands=look)
+    monkeypatch.setitem(GOALS, "crouch", term)
+    motion = stylised_series("barefoot").motion
+    assert goal_values(motion, WEIGHT, {})["crouch"] >= 0.0
+    assert len(seen["rate"]) == len(seen["excitation"]) == len(GENERATORS)
+    assert len(seen["vdot"]) == N

@@ -210,3 +210,16 @@ def test_an_orthosis_may_have_a_file_of_its_own(tmp_path: Path) -> None:
         yaml.safe_dump({**worn, "neutral_angle": 0.0}), encoding="utf-8"
     )
     assert load_patient(child).content != before
+
+
+def test_a_number_stands_at_its_key_then_in_numbers_then_is_the_default() -> None:
+    patient = load_patient("sreenivasa2017-patient")
+    assert patient.number("orthosis.neutral_angle.right", 0.5) == -0.02
+    assert patient.number("tissue.knee.right", 3.0) == 3.0
+    own = patient.model_copy(update={"numbers": {"tissue.knee": 4.0, "tissue.knee.left": 5.0}})
+    assert own.number("tissue.knee.right", 3.0) == 4.0
+    assert own.number("tissue.knee.left", 3.0) == 5.0
+    bare = patient.model_copy(update={"orthosis": None})
+    assert bare.number("orthosis.damping.left", 0.1) == 0.1
+    with pytest.raises(PatientError, match="strengths is not given"):
+        patient.model_copy(update={"strengths": None}).number("strengths.hip_flexion.left")

@@ -10,6 +10,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES
 from pathwalker_cli.gait.costs import BASE, GOALS, Costs, Instant, Totals, Weights
 from pathwalker_cli.model.contact import phase_named
+from pathwalker_cli.model.elements.muscle import excitation_from_rate
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 from pathwalker_cli.ocp.problem import Sample
 
@@ -98,9 +99,14 @@ def _goal_gains(phase: PhaseMotion, costs: Costs, weight: float) -> np.ndarray:
     """Return the integrals of the goals' running costs over every interval, shape (N, k)."""
     contact, n = phase_named(phase.name), len(COORDINATES)
     shape = phase.inner_states.shape[:2]
-    activation = phase.smooth_at(phase.point_fractions.ravel()).reshape(*shape, -1)
+    fractions = phase.point_fractions.ravel()
+    activation, rate = (
+        at(fractions).reshape(*shape, -1) for at in (phase.smooth_at, phase.controls_at)
+    )
     q, v = np.split(phase.inner_states, 2, axis=-1)
-    columns = q, v, activation, phase.algebraic[..., n : n + len(contact.forces)]
+    vdot, force, reserve = np.split(phase.algebraic, [n, n + len(contact.forces)], axis=-1)
+    excitation = excitation_from_rate(rate, activation)
+    columns = q, v, activation, force, rate, excitation, vdot, reserve
     point = Instant(contact, *(list(np.moveaxis(values, -1, 0)) for values in columns))
     running = costs.integrands(point, list(costs.numbers(weight)), costs.goals)
     values = np.array([np.broadcast_to(cost, shape) for cost in running])

@@ -77,7 +77,7 @@ class Unknown:
         first, alone = numbers[0], len(numbers) == 1
         label = f"{first.label} {first.side}" if alone and first.side else first.label
         name = first.full_name if alone else first.name
-        return cls(name, label, numbers, UNIT_SIZES[first.unit])
+        return cls(name, label, numbers, UNIT_SIZES.get(first.unit, 1.0))
 
     @property
     def unit(self) -> str:

@@ -28,7 +28,7 @@ class Joint:
         axis: Axis of the joint frame along or about which it moves.
         slides: Whether it is a slider [m], not a hinge [rad].
         side: The side that it belongs to; None on the midline.
-        actuated: Whether muscles act on it; nothing drives the free pelvis.
+        root: Whether it hangs the pelvis on the world: nothing drives it.
     """
 
     coordinate: str
@@ -37,7 +37,7 @@ class Joint:
     axis: Literal["x", "y", "z"] = "y"
     slides: bool = False
     side: Side | None = None
-    actuated: bool = True
+    root: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Skeleton:
     @cached_property
     def root(self) -> tuple[str, ...]:
         """Coordinates that no actuator drives: where and how the pelvis is."""
-        return tuple(joint.coordinate for joint in self.joints if not joint.actuated)
+        return tuple(joint.coordinate for joint in self.joints if joint.root)
 
     @property
     def size(self) -> int:
@@ -91,11 +91,9 @@ def _leg(side: Side) -> tuple[Joint, ...]:
 
 PLANAR_WALKER: Final = Skeleton(
     (
-        Joint("pelvis_tx", "world", "pelvis_tx_slider", "x", slides=True, actuated=False),
-        Joint(
-            "pelvis_tz", "pelvis_tx_slider", "pelvis_tz_slider", "z", slides=True, actuated=False
-        ),
-        Joint("pelvis_tilt", "pelvis_tz_slider", "pelvis", actuated=False),
+        Joint("pelvis_tx", "world", "pelvis_tx_slider", "x", slides=True, root=True),
+        Joint("pelvis_tz", "pelvis_tx_slider", "pelvis_tz_slider", "z", slides=True, root=True),
+        Joint("pelvis_tilt", "pelvis_tz_slider", "pelvis", root=True),
         *_leg("right"),
         *_leg("left"),
         Joint("lumbar", "pelvis", "trunk"),

@@ -106,7 +106,7 @@ def _joint(name: str, parent: str, child: str, origin: Vector) -> list[str]:
 
 def _root() -> list[str]:
     """Return the three joints between world and pelvis with the empty links between them."""
-    return [line for joint in PLANAR_WALKER.joints if not joint.actuated for line in _hung(joint)]
+    return [line for joint in PLANAR_WALKER.joints if joint.root for line in _hung(joint)]
 
 
 def _hung(joint: Joint) -> list[str]:

@@ -46,7 +46,8 @@ class IpoptSettings:
         max_iterations: Iteration limit.
         initial_barrier: Start of the barrier parameter `mu_init`.
         warm_start: Whether to start from the given multipliers and close to the bounds.
-        extra: Further options by their IPOPT name; they win over the rest.
+        extra: Further options by their IPOPT name; they win over the rest. `linear_solver`, and
+            options of MUMPS, take the place of the compiled linear solver.
     """
 
     tolerance: float = 1e-6
@@ -159,10 +160,12 @@ class NlpSolver:
         # held: IPOPT does not keep functions alive that are written in Python
         self._functions = functions = program.functions
         self._watcher = Watcher(program, observer)
-        known = program.elimination_keys is not None and "linear_solver" not in settings.extra
+        other = any(key.startswith(("linear_solver", "mumps_")) for key in settings.extra)
+        known = program.elimination_keys is not None and not other
         self._factors = stage_factors() if known else None
         options: dict[str, Any] = {
-            "ipopt": settings.as_options() | (ma57_options() if self._factors else {}),
+            "ipopt": settings.as_options()
+            | (ma57_options() | settings.extra if self._factors else {}),
             "print_time": False,
             "error_on_fail": False,
             "iteration_callback": self._watcher,

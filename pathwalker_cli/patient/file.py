@@ -170,14 +170,18 @@ class Patient(YamlModel):
             PatientError: If the file gives none there, and there is no default.
         """
         place = address.rpartition(".")[0] if address.endswith(SIDES) else address
-        given = self.numbers.get(address, self.numbers.get(place, default))
+        given = self.numbers.get(address, self.numbers.get(place))
+        if given is None and place.partition(".")[0] not in Patient.model_fields:
+            given = default
         if given is not None:
             return given
         holder: Any = self
         for part in address.split("."):
             if isinstance(holder, int | float):  # one number for both sides
                 break
-            holder = holder[part] if isinstance(holder, Sides) else getattr(holder, part)
+            holder = holder[part] if isinstance(holder, Sides) else getattr(holder, part, None)
+            if holder is None and default is not None:
+                return default
             if holder is None and part == "strengths":
                 raise self._lacks("strengths", "add them, or estimate them from recordings")
             if holder is None:
