@@ -34,7 +34,7 @@ from pathwalker_cli.nlp import tape_store
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.metrics import run_inputs
 from pathwalker_cli.results.run_folder import claimed_run, load_run, release_runs, write_run
-from pathwalker_cli.studies import journal
+from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies import run as studies_run
 from pathwalker_cli.studies.base import claimed_folder
 from pathwalker_cli.studies.run import run_study
@@ -136,7 +136,7 @@ def test_other_files_killed_at_any_step_are_old_or_new(tmp_path: Path) -> None:
 
     def act() -> None:
         with claimed_folder(tmp_path, frozenset({"points", "study.json"}), "perturb"):
-            journal._write(path, "seal", made_result())
+            neighbours._write(path, "seal", made_result())
             write_json(tmp_path / "study.json", {"made": 2})
 
     def look() -> None:
@@ -144,7 +144,7 @@ def test_other_files_killed_at_any_step_are_old_or_new(tmp_path: Path) -> None:
             pass
         assert not left_over(tmp_path)
         seen.append((path.exists(), read_json(tmp_path / "study.json")["made"]))
-        assert not path.exists() or journal._read(path, "seal") is not None
+        assert not path.exists() or neighbours._read(path, "seal") is not None
 
     assert killed_at_every_step(act, look) >= 8
     assert list(dict.fromkeys(seen)) == [(False, 1), (True, 1), (True, 2)]
@@ -324,7 +324,7 @@ def test_a_disk_that_fills_up_loses_no_solution(
 
 
 @pytest.mark.parametrize("write", [
-    lambda path: journal._write(path, "seal", made_result()),
+    lambda path: neighbours._write(path, "seal", made_result()),
     lambda path: write_json(path, {"text": "x" * 300_000}),
 ])  # fmt: skip
 def test_a_file_on_a_full_disk_is_named_and_not_half_there(

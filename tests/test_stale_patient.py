@@ -33,14 +33,16 @@ from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.stride.verify import reintegrate
-from pathwalker_cli.studies import neighbours, pool
+from pathwalker_cli.studies import (
+    landscape,
+    neighbours,
+    perturbation,
+    sensitivity,
+    tradeoff,
+    uncertainty,
+)
 from pathwalker_cli.studies import run as study_run
-from pathwalker_cli.studies.batch import local
-from pathwalker_cli.studies.landscape import solve as landscape
-from pathwalker_cli.studies.perturbation import study as perturbation
-from pathwalker_cli.studies.sensitivity import study as sensitivity
-from pathwalker_cli.studies.tradeoff import study as tradeoff
-from pathwalker_cli.studies.uncertainty import study as uncertainty
+from pathwalker_cli.studies.batch import worker
 from pathwalker_cli.verification import checks
 from report_runs import write_made_run
 
@@ -114,9 +116,9 @@ class Around:
 
     def __init__(self, resolver: StandInResolver) -> None:
         case = resolver.case
-        self.optimum: Any = SimpleNamespace(
-            case=case, free=(), solver=StandInOptimum(case, made_result()).solver
-        )
+        solver = StandInOptimum(case, made_result()).solver
+        solver.free, solver.case, solver.config = (), case, case.config
+        self.optimum: Any = SimpleNamespace(case=case, free=(), solver=solver)
 
     def by_factor(self, place: str) -> Derivative:
         return Derivative(1e-3 * kg(self.optimum), self.optimum, self.optimum, 1e-4)
@@ -152,22 +154,21 @@ def quick(monkeypatch: pytest.MonkeyPatch, made_solution: Callable[..., GaitSolu
         made = made_solution(case.config.problem, case=case, walker=case.walker())
         return made if earlier is None else replace(made, cost=float(earlier.motion.duration))
 
-    def near(run: Run, tolerance: float = 0.0) -> StandInResolver:
-        return StandInResolver(run.case)
+    def near(run: Run, tolerance: float | None = None) -> StandInResolver | MadeResolver:
+        return MadeResolver(run.case) if tolerance is None else StandInResolver(run.case)
 
     def numbers(optimum: StandInOptimum) -> dict[str, float]:
         return {**stand_in_measures(optimum), "stride_time": 0.03 * kg(optimum)}
 
     monkeypatch.setattr(study_run, "_solve", solved)
     monkeypatch.setattr(study_run, "verdict_of", lambda _: None)
-    monkeypatch.setattr(local, "LocalPool", HereAndNow)
+    monkeypatch.setattr(worker, "LocalPool", HereAndNow)
     monkeypatch.setattr(Figure, "savefig", shown)
-    for place in (perturbation, uncertainty, pool, sensitivity):
+    for place in (perturbation, uncertainty, neighbours, sensitivity):
         monkeypatch.setattr(place, "resolver_of", near)
         monkeypatch.setattr(place, "measures", numbers)
     monkeypatch.setattr(sensitivity, "Neighbourhood", Around)
     monkeypatch.setattr(sensitivity, "all_measures", lambda o: {"cost": 0.01 * kg(o)})
-    monkeypatch.setattr(neighbours, "resolver_of", lambda run: MadeResolver(run.case))
     for place in (landscape, tradeoff):
         monkeypatch.setattr(
             place, "measures", lambda o: {**made_measures(o), "stride_time": 0.03 * kg(o)}
