@@ -171,8 +171,6 @@ class Patient(YamlModel):
         """
         place = address.rpartition(".")[0] if address.endswith(SIDES) else address
         given = self.numbers.get(address, self.numbers.get(place))
-        if given is None and place.partition(".")[0] not in Patient.model_fields:
-            given = default
         if given is not None:
             return given
         holder: Any = self

@@ -32,17 +32,6 @@ from pathwalker_cli.studies.landscape.text import (
 from pathwalker_cli.studies.measures import free_units, measures
 from pathwalker_cli.studies.neighbours import Neighbours, motion_distance, motion_signature
 
-__all__ = [
-    "STUDY",
-    "Axis",
-    "LandscapeStudy",
-    "axis_values",
-    "grid",
-    "landscape_of",
-    "varied_springs",
-    "with_springs",
-]
-
 _KINDS: Final = ("dorsiflexion", "plantarflexion")
 
 _BETTER: Final = 1e-3

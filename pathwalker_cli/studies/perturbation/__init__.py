@@ -50,8 +50,6 @@ from pathwalker_cli.studies.perturbation.result import (
     write_tables,
 )
 
-__all__ = ["STUDY", "PerturbationStudy", "moved_numbers", "perturb"]
-
 POINTS: Final = "points"
 """Folder of the solved neighbours."""
 

@@ -44,8 +44,6 @@ from pathwalker_cli.studies.sensitivity.result import (
     write_sensitivities,
 )
 
-__all__ = ["STUDY", "SensitivityStudy", "asked_places", "default_places", "sensitivities"]
-
 POINTS: Final = "points"
 """Folder of the re-solves of a check."""
 

@@ -34,8 +34,6 @@ from pathwalker_cli.studies.tradeoff.result import (
     write_tables,
 )
 
-__all__ = ["STUDY", "TradeoffStudy", "chain", "tradeoff_of"]
-
 ROOT: Final = "base"
 """Name of the run that everything begins with."""
 

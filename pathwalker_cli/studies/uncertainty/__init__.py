@@ -35,8 +35,6 @@ from pathwalker_cli.studies.uncertainty.result import (
     write_tables,
 )
 
-__all__ = ["STUDY", "UncertaintyStudy", "draw_cases", "uncertainty"]
-
 DRAWS: Final = "draws"
 """Folder of the solved draws."""
 
