@@ -11,7 +11,9 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager, suppress
+from multiprocessing.context import SpawnContext
 from multiprocessing.resource_tracker import ensure_running
+from multiprocessing.synchronize import RLock
 from typing import Any, Final, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
@@ -56,6 +58,23 @@ def prepare_worker() -> None:
     threading.Thread(target=wait_and_end, daemon=True).start()
 
 
+class _KeptLocks(SpawnContext):
+    """A context whose locks last as long as itself.
+
+    The pool forgets its locks before it ends its workers; one that has only begun by then would
+    miss them with a traceback.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.locks: list[RLock] = []
+
+    def RLock(self) -> RLock:  # noqa: N802 - the name of the base class
+        """Return a new lock, and keep it."""
+        self.locks.append(super().RLock())
+        return self.locks[-1]
+
+
 def ended_calls(
     call: Callable[..., Result],
     calls: Sequence[tuple[Any, ...]],
@@ -75,7 +94,7 @@ def ended_calls(
         time_limit: Longest time of a call [s], after which its future raises `TimeoutError`.
     """
     waiting, running = deque(enumerate(calls)), dict[Future[Result], int]()
-    count, context = min(workers, len(calls)), multiprocessing.get_context("spawn")
+    count, context = min(workers, len(calls)), _KeptLocks()
     pool = ProcessPool(count, initializer=prepare_worker, context=context)
     try:
         while waiting or running:
