@@ -57,7 +57,7 @@ class Case:
             ConfigError: If the variation does not fit the patient.
             PatientError: If the patient that results is refused.
         """
-        return varied(self.unvaried, self.config.variation)
+        return varied(self.unvaried, self.config.variation, self.config.numbers)
 
     def walker(self, backend: str = "auto") -> Walker:
         """Return the walking model of the patient in the condition of the problem.
@@ -71,9 +71,11 @@ class Case:
         """
         from pathwalker_cli.model.walker import build_walker  # takes long: only who needs it
 
-        config = self.config
+        config, model = self.config, self.config.model
         free = tuple(config.free)
-        return build_walker(self.patient, config.condition, config.model.published, backend, free)
+        return build_walker(
+            self.patient, config.condition, model.published, backend, free, model.tissue
+        )
 
     def with_values(self, values: Mapping[str, Any], where: str = "") -> Case:
         """Return the case with other values in its config; see `config.with_values`.

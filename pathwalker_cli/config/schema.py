@@ -74,6 +74,7 @@ class ModelConfig(YamlModel):
 
     backend: Literal["auto", "pinocchio.casadi", "compiled", "direct"] = "auto"
     published: bool = False
+    tissue: bool = False
 
 
 class CostConfig(YamlModel):
@@ -88,6 +89,7 @@ class CostConfig(YamlModel):
     activation_power: Annotated[int, Field(ge=2, le=10)] = 2
     goals: Annotated[dict[str, Weight], _keys_of(GOALS)] = Field(default_factory=dict)
     comfort_ranges: RangeByAngle = Field(default_factory=dict)
+    trunk_lean: Angle = 0.0
 
     @model_validator(mode="after")
     def _ranges_of_goals(self) -> CostConfig:
@@ -108,7 +110,7 @@ class CostConfig(YamlModel):
     def wanted(self) -> Costs:
         """The goals that have a weight, and what they need."""
         names = tuple(name for name in GOALS if self.goals.get(name, 0.0) > 0.0)
-        return Costs(names, self.activation_power, self.comfort_ranges)
+        return Costs(names, self.activation_power, self.comfort_ranges, self.trunk_lean)
 
 
 class BoundsConfig(YamlModel):
@@ -203,6 +205,7 @@ class StudyConfig(YamlModel):
     problem: str
     patient: str
     variation: Variation = Variation()
+    numbers: dict[str, Amount] = Field(default_factory=dict)
     free: dict[str, AmountRange] = Field(default_factory=dict)
     model: ModelConfig = ModelConfig()
     cost: CostConfig = CostConfig()

@@ -117,6 +117,11 @@ class CostTerm:
     per_distance: bool = False
     result: str = ""
 
+    def worth(self, total: Totals) -> Any:
+        """Return the term without its weight [unit]; a number or an expression."""
+        value = self.value(total)
+        return value / total.distance if self.per_distance else value
+
 
 def _squares(name: str, size: float = 1.0) -> Callable[[Instant], tuple[Any, ...]]:
     """Return the sum of squares of what an instant holds under a name as a running cost."""
@@ -230,12 +235,36 @@ def _beyond(x: Any) -> Any:
     return 0.5 * (x + (x * x + choices.COMFORT_ROUNDING**2) ** 0.5)
 
 
+def _trunk_speed(point: Instant) -> tuple[Any, ...]:
+    speeds = (point.v[COORDINATES.index(name)] for name in _TRUNK)
+    return (sum(speeds) ** 2,)
+
+
+def _trunk_lean(point: Instant) -> tuple[Any, ...]:
+    return ((sum(map(point.angle, _TRUNK)) - point.data[0]) ** 2,)
+
+
 def _mean(name: str) -> Callable[[Totals], Any]:
     """Return the mean over the stride of one running cost as a value."""
     return lambda total: total.integrals[name] / total.time
 
 
+_TRUNK: Final = ("pelvis_tilt", "lumbar")
+"""Coordinates whose sum is the forward lean of the trunk."""
+
 GOALS: Final[dict[str, CostTerm]] = {
+    "time": CostTerm(
+        "get there: time per distance; its weight is what a second costs",
+        (), _none, lambda total: total.time, "s/m", per_distance=True,
+    ),
+    "steady_trunk": CostTerm(
+        "a steady trunk: squared angular velocity of the trunk, per distance",
+        ("trunk_speed",), _trunk_speed, _of("trunk_speed"), "rad^2/(s m)", per_distance=True,
+    ),
+    "upright_trunk": CostTerm(
+        "a trunk that leans as wanted: squared difference of its lean, per distance",
+        ("trunk_lean",), _trunk_lean, _of("trunk_lean"), "rad^2 s/m", size=1, per_distance=True,
+    ),
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",
         ("crouch",), _crouch, _mean("crouch"), "rad^2",
@@ -270,12 +299,14 @@ class Costs:
         names: Names of the goals that count, in the order of `GOALS`.
         activation_power: Power of the activations in the effort.
         comfort_ranges: Comfortable range by coordinate [rad].
+        trunk_lean: Forward lean of the trunk that "upright_trunk" wants [rad].
         passage: Whether a recorded passage is followed, equation (8).
     """
 
     names: tuple[str, ...] = ()
     activation_power: int = 2
     comfort_ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    trunk_lean: float = 0.0
     passage: bool = False
 
     @property
@@ -313,7 +344,11 @@ class Costs:
         """Return the numbers of all terms for a body weight, orthosis included [N], (size,)."""
         wide = (-choices.NO_EDGE, choices.NO_EDGE)
         ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
-        known = {"centre_of_pressure": [weight], "discomfort": np.array(ranges).T.ravel()}
+        known = {
+            "upright_trunk": [self.trunk_lean],
+            "centre_of_pressure": [weight],
+            "discomfort": np.array(ranges).T.ravel(),
+        }
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])
 
     def integrands(
@@ -344,15 +379,11 @@ class Costs:
     def values(self, weights: Weights, total: Totals) -> dict[str, float]:
         """Return the weighed terms by the names that results give them."""
         return {
-            term.result or name: float(
-                weights.get(name, 0.0)
-                * term.value(total)
-                / (total.distance if term.per_distance else 1.0)
-            )
+            term.result or name: float(weights.get(name, 0.0) * term.worth(total))
             for name, term in self.terms.items()
             if name in GOALS or term.result
         }
 
     def goal_values(self, total: Totals) -> dict[str, Any]:
         """Return the goals without weights by name."""
-        return {name: term.value(total) for name, term in self.goals.items()}
+        return {name: term.worth(total) for name, term in self.goals.items()}

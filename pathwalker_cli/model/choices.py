@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-UNIT_SIZES: Final = {"N m/rad": 50.0, "N m": 10.0, "rad": 0.1, "kg": 1.0, "m": 0.1}
+UNIT_SIZES: Final = {
+    "N m/rad": 50.0, "N m": 10.0, "rad": 0.1, "deg": 10.0, "kg": 1.0, "m": 0.1, "N m s/rad": 0.1,
+}  # fmt: skip
 """What counts as 1 for the solver, by unit; for stiffnesses prototypes needed the fewest
 iterations with this, the others are of the size of the numbers themselves."""
 
@@ -19,3 +21,11 @@ STEEP: Final = 0.5
 """Stiffness, as a share of 2 tau_0/theta_W, up to which the preload rises with 4 tau_0/theta_W."""
 NO_PRELOAD: Final = 1e-12
 """Keeps the ratio of an orthosis without preload finite [N m]."""
+
+# Passive tissue.
+STEEPEST: Final = 5.0
+"""Exponent beyond which an exponential goes on as a parabola: 148 N m of an adult, which no joint
+of a gait comes near, while a start may."""
+DAMPING: Final = 0.1
+"""Damping of hip, knee and ankle [N m s/rad]: a few tenths of a newton metre in swing, of the size
+that pendulum tests of relaxed legs find."""

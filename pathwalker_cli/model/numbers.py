@@ -8,14 +8,18 @@ one side, for each, or for both alike.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.model.choices import UNIT_SIZES
 from pathwalker_cli.model.skeleton import SIDES, Side
+
+if TYPE_CHECKING:
+    from pathwalker_cli.patient import Patient
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,8 @@ class Number:
         label: The name for people, e.g. "neutral angle".
         unit: SI unit.
         side: The side that it belongs to.
-        default: Its value where the patient's file gives none; None where it has to.
+        default: Its value where the patient's file gives none, or how it follows from the patient;
+            None where the file has to give it.
         source: Where the default comes from.
         faded: Whether the first stage of a solve lets only a share of it act: torques that would
             fight a stride that knows nothing of them.
@@ -40,9 +45,14 @@ class Number:
     label: str
     unit: str
     side: Side | None = None
-    default: float | None = None
+    default: float | Callable[[Patient], float] | None = None
     source: str = ""
     faded: bool = False
+
+    def value_for(self, patient: Patient) -> float:
+        """Return what it is worth for a patient [unit]."""
+        default = self.default(patient) if callable(self.default) else self.default
+        return patient.number(self.address, default)
 
     @property
     def place(self) -> str:

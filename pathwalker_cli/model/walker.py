@@ -20,14 +20,14 @@ from pathwalker_cli.model.devices import DEVICES, Device
 from pathwalker_cli.model.elements import ForceElement, State, element_forces, generalised_forces
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
 from pathwalker_cli.model.elements.orthosis import OrthosisSide
+from pathwalker_cli.model.elements.tissue import leg_tissue
 from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at
 from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 
 _MUSCLES: Final = generators()
-_TISSUE: Final[tuple[ForceElement, ...]] = ()
-"""Force elements of every body beside the muscles."""
+_TISSUE: Final = leg_tissue()
 
 
 @dataclass(frozen=True)
@@ -312,6 +312,7 @@ def build_walker(
     published: bool = False,
     backend: str = "auto",
     free: Sequence[str] = (),
+    tissue: bool = False,
 ) -> Walker:
     """Return the walking model of a patient.
 
@@ -321,6 +322,7 @@ def build_walker(
         published: Reproduce the quirks of the published model (right forearm).
         backend: Dynamics back end, see `model.backends`.
         free: Addresses of numbers that a problem may choose, beside those that it looks for anyway.
+        tissue: Whether joints have passive torques.
 
     Raises:
         InputError: If the condition does not exist.
@@ -335,8 +337,8 @@ def build_walker(
     if device.worn:
         patient.require_orthosis()
     model = pinocchio_model(patient, condition, published)
-    numbers = _numbers((*_MUSCLES, *_TISSUE, *device.forces), device)
-    values = {n.address: patient.number(n.address, n.default) for n in numbers}
+    numbers = _numbers((*_MUSCLES, *_passive(tissue), *device.forces), device)
+    values = {n.address: n.value_for(patient) for n in numbers}
     return Walker(
         patient=patient,
         condition=condition,
@@ -344,10 +346,10 @@ def build_walker(
         model=model,
         rigid_body=rigid_body_functions(model, CONTACT_POINTS, backend),
         muscles=_MUSCLES,
-        tissue=_TISSUE,
+        tissue=_passive(tissue),
         device=device,
         values=values,
-        unknowns=unknowns_of(condition, free),
+        unknowns=unknowns_of(condition, free, tissue),
         published=published,
     )
 
@@ -358,7 +360,13 @@ def _numbers(elements: Sequence[ForceElement], device: Device) -> tuple[Number, 
     return (*of_elements, *device.added_mass.values())
 
 
-def unknowns_of(condition: Condition, free: Sequence[str] = ()) -> tuple[Unknown, ...]:
+def _passive(tissue: bool) -> tuple[ForceElement, ...]:
+    return _TISSUE if tissue else ()
+
+
+def unknowns_of(
+    condition: Condition, free: Sequence[str] = (), tissue: bool = False
+) -> tuple[Unknown, ...]:
     """Return what a problem chooses: what is asked for, and what a device is identified by.
 
     What a device is identified for stands first, per kind right before left, unless both sides
@@ -367,12 +375,13 @@ def unknowns_of(condition: Condition, free: Sequence[str] = ()) -> tuple[Unknown
     Args:
         condition: "barefoot" or "orthosis".
         free: Addresses of numbers that are asked for.
+        tissue: Whether joints have passive torques.
 
     Raises:
         ConfigError: If there is no such number.
     """
     device = DEVICES[condition]
-    numbers = _numbers((*_MUSCLES, *_TISSUE, *device.forces), device)
+    numbers = _numbers((*_MUSCLES, *_passive(tissue), *device.forces), device)
     asked = unknowns_at(free, numbers)
     taken = {address for unknown in asked for address in unknown.addresses}
     usual = [

@@ -21,6 +21,7 @@ Offset = Annotated[
 Strength = Annotated[float, Quantity("N m", 0.1, 500.0)]
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
 Stiffness = Annotated[float, Quantity("N m/rad", 1.0, 1000.0, below="is it in N m per degree?")]
+_Reach = Annotated[float, Quantity("deg", -90.0, 110.0)]
 Point = Annotated[tuple[Offset, Offset], AS_TUPLE]
 """A point in the foot frame: [forward, up] of the ankle [m]."""
 
@@ -95,6 +96,21 @@ class Strengths(YamlModel):
             if isinstance(value, Sides):
                 torques |= {f"{kind}_{SUFFIX[side]}": value[side] for side in SIDES}
         return tuple(float(torques[name]) for name in GENERATORS)
+
+
+class Examination(YamlModel):
+    """Passive range of motion from the couch [deg], with the usual names and signs.
+
+    Hip and knee extension, and dorsiflexion, count in the direction of their names and are negative
+    where the joint does not reach zero; the popliteal angle is the knee flexion that is left with
+    the hip at 90 degrees.  What is left out is that of typical children.
+    """
+
+    hip_extension: Sides[_Reach] | None = None
+    popliteal_angle: Sides[_Reach] | None = None
+    knee_extension: Sides[_Reach] | None = None
+    dorsiflexion_knee_extended: Sides[_Reach] | None = None
+    dorsiflexion_knee_flexed: Sides[_Reach] | None = None
 
 
 class AddedMass(YamlModel):

@@ -21,6 +21,7 @@ from pathwalker_cli.io.yaml_file import mapping_in, read_text, validate
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient.blocks import (
     ContactPoints,
+    Examination,
     FootPoints,
     OrthosisData,
     Recorded,
@@ -73,6 +74,7 @@ class Patient(YamlModel):
     segment_lengths: SegmentLengths = SegmentLengths()
     contact_points: ContactPoints = ContactPoints()
     strengths: Strengths | None = None
+    examination: Examination = Examination()
     orthosis: OrthosisData | None = None
     recorded: dict[Condition, Recorded] = Field(default_factory=dict)
     numbers: dict[str, Annotated[float, Quantity("SI units", -1e4, 1e4)]] = Field(

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field
 
+from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import ConfigError, PatientError, did_you_mean
 from pathwalker_cli.io.fields import Quantity, YamlModel
 from pathwalker_cli.io.yaml_file import validate
@@ -46,18 +47,27 @@ class Variation(YamlModel):
         return Variation(scale=scale, shift=shift)
 
 
-def varied(patient: Patient, variation: Variation) -> Patient:
+def varied(
+    patient: Patient, variation: Variation, numbers: Mapping[str, float] | None = None
+) -> Patient:
     """Return a patient with some numbers changed.
 
     Lengths that the file leaves to body proportions are filled in before they are changed.
+
+    Args:
+        patient: The patient.
+        variation: Factors and shifts.
+        numbers: Named numbers that count instead of the file's, by address; they come first.
 
     Raises:
         ConfigError: If a place does not exist or holds no number.
         PatientError: If the patient that results is refused.
     """
-    if not variation.scale and not variation.shift:
+    if not variation.scale and not variation.shift and not numbers:
         return patient
     content = _filled_in(patient)
+    for address, value in (numbers or {}).items():
+        _put(content, address, value)
     for place, factor in variation.scale.items():
         _change(content, f"variation.scale.{place}", place, partial(mul, factor))
     for place, amount in variation.shift.items():
@@ -65,7 +75,8 @@ def varied(patient: Patient, variation: Variation) -> Patient:
     changed = validate(
         content, Patient, where=f"{patient.id} with its variation", error=PatientError
     )
-    notes = [f"{place} x {factor:g}" for place, factor in variation.scale.items()]
+    notes = [f"{place} = {value:g}" for place, value in (numbers or {}).items()]
+    notes += [f"{place} x {factor:g}" for place, factor in variation.scale.items()]
     notes += [f"{place} {amount:+g}" for place, amount in variation.shift.items()]
     changed._origin = patient._origin
     changed._changes = (f"differs from the patient's file: {', '.join(notes)}",)
@@ -82,6 +93,21 @@ def _filled_in(patient: Patient) -> dict[str, Any]:
     if points["barefoot"] is None:
         points["barefoot"] = patient.contacts("barefoot").model_dump(mode="json")
     return {key: value for key, value in content.items() if value is not None}
+
+
+def _put(content: dict[str, Any], address: str, value: float) -> None:
+    """Put a number in the place that the file has for it, else among its further numbers."""
+    *parents, last = address.split(".")
+    holder: Any = content
+    for part in parents:
+        below = holder.get(part) if isinstance(holder, dict) else None
+        if last in SIDES and isinstance(below, int | float):
+            below = holder[part] = dict.fromkeys(SIDES, below)
+        holder = below
+    if isinstance(holder, dict) and last in holder:
+        holder[last] = value
+    else:
+        content["numbers"][address] = value
 
 
 def _change(

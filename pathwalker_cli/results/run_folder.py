@@ -298,7 +298,7 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
         _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
     case = _kept_case(folder)
     config = case.config
-    expected = len(unknowns_of(config.condition, tuple(config.free)))
+    expected = len(unknowns_of(config.condition, tuple(config.free), config.model.tissue))
     if config.problem != metrics["problem"] or motion.parameters.size != expected:
         where = str(folder / CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)

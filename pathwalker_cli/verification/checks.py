@@ -235,7 +235,7 @@ def _dynamics(run: Run, series: GaitSeries, numbers: dict[str, Any]) -> Iterator
     unit = "N or N m"
     yield Check("numeric Pinocchio", second_engine_residual(series), _EQUATIONS, unit)
     for backend in dict.fromkeys((walker.backend, "direct")):
-        other = build_walker(walker.patient, config.condition, config.model.published, backend)
+        other = run.case.walker(backend)
         yield Check(f"back end {backend}", equation_residual(series, other), _EQUATIONS, unit)
     errors = reintegrate(walker, run.motion)
     refined = mesh.refinements > 0
