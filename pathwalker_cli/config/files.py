@@ -30,7 +30,7 @@ def load_config(path: str | Path, problem: str = "", changes: tuple[str, ...] = 
     Raises:
         ConfigError: If file or overrides are wrong.
     """
-    config, source = read_config(path, StudyConfig, changes)
+    config, source = read_config(path, StudyConfig, changes, complete=_with_learnt)
     if problem and config.problem != problem:
         raise ConfigError(
             f"is a config for {config.problem}, but {problem} was asked for",
@@ -46,6 +46,7 @@ def read_config(
     model: type[Model],
     changes: tuple[str, ...] = (),
     apply: Callable[[dict[str, Any], str], KeyPath] = apply_change,
+    complete: Callable[[dict[str, Any], Path, tuple[str, ...]], None] = lambda *_: None,
 ) -> tuple[Model, Path]:
     """Read a config of any kind; return it and its file.
 
@@ -54,6 +55,7 @@ def read_config(
         model: Model of its content.
         changes: Overrides "dotted.key=value", as from the command line.
         apply: Puts one of them into the content and returns the key that it changes.
+        complete: Puts into the content, from this file with these overrides, what other files hold.
 
     Raises:
         ConfigError: If file or overrides are wrong.
@@ -65,7 +67,30 @@ def read_config(
         for replaced in [k for k in origins if k[: len(key)] == key]:
             del origins[replaced]
         origins[key] = f"--set {change}"
+    complete(mapping, source, changes)
     return validate(mapping, model, where=str(path), error=ConfigError, lines=origins), source
+
+
+def _with_learnt(mapping: dict[str, Any], source: Path, changes: tuple[str, ...]) -> None:
+    """Put learnt numbers in the place of the name of their file.
+
+    A file is looked for beside the config, then beside the shipped patients.
+
+    Raises:
+        ConfigError: If it cannot be read.
+    """
+    name = mapping.get("learnt")
+    if not isinstance(name, str):
+        return
+    beside = place_of("learnt", source, changes) / name
+    file = beside if os.path.isfile(beside) else shipped("patient_data") / name
+    if not os.path.isfile(file):
+        raise ConfigError(
+            f"names {name}, which does not exist",
+            where=f"{source}, learnt",
+            allowed="a file that `pathwalker learn` wrote, beside the config",
+        )
+    mapping["learnt"] = read_mapping(file, ConfigError)[0]
 
 
 def config_content(path: str | Path) -> tuple[Path, dict[str, Any], Lines]:

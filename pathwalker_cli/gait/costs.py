@@ -244,6 +244,12 @@ def _trunk_lean(point: Instant) -> tuple[Any, ...]:
     return ((sum(map(point.angle, _TRUNK)) - point.data[0]) ** 2,)
 
 
+def _foot_pitch(point: Instant) -> tuple[Any, ...]:
+    swinging = (side for side in "rl" if side not in point.stance)
+    chain = [("pelvis_tilt", *(f"{joint}_{side}" for joint in LEG_JOINTS)) for side in swinging]
+    return (sum((sum(map(point.angle, names)) ** 2 for names in chain), 0.0 * point.q[0]),)
+
+
 def _mean(name: str) -> Callable[[Totals], Any]:
     """Return the mean over the stride of one running cost as a value."""
     return lambda total: total.integrals[name] / total.time
@@ -264,6 +270,10 @@ GOALS: Final[dict[str, CostTerm]] = {
     "upright_trunk": CostTerm(
         "a trunk that leans as wanted: squared difference of its lean, per distance",
         ("trunk_lean",), _trunk_lean, _of("trunk_lean"), "rad^2 s/m", size=1, per_distance=True,
+    ),
+    "level_foot": CostTerm(
+        "carry the foot level: squared pitch of feet in the air, per distance",
+        ("foot_pitch",), _foot_pitch, _of("foot_pitch"), "rad^2 s/m", per_distance=True,
     ),
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",

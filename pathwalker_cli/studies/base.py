@@ -34,6 +34,10 @@ class NeighbourStudy(YamlModel):
     base: str
     set: dict[str, Any] = Field(default_factory=dict)
 
+    def based_on(self, case: Case) -> Case:
+        """Return the case of the base as the study wants it solved first."""
+        return case
+
     def solved_as(self, case: Case) -> Case:
         """Return a case as the study solves it: to a tolerance of its own where it has one."""
         return case
@@ -162,8 +166,10 @@ def base_case(study: NeighbourStudy) -> Case:
         ConfigError: If there is no such config, or it is wrong.
         PatientError: If there is no such patient, or its file is refused.
     """
-    config = load_config(study.base)
-    return Case.of(with_values(config, study.set, f"set of the study on {study.base}"))
+    unlearnt = "learnt" in study.set and study.set["learnt"] is None
+    config = load_config(study.base, changes=("learnt=null",) if unlearnt else ())
+    case = Case.of(with_values(config, study.set, f"set of the study on {study.base}"))
+    return study.based_on(case)
 
 
 def planned(

@@ -46,13 +46,16 @@ class Journal:
         self.solved = 0
         """Neighbours that were solved by this journal, not read."""
 
-    def resolve(self, name: str, case: Case, start: Optimum | None = None) -> Optimum:
+    def resolve(
+        self, name: str, case: Case, start: Optimum | None = None, insist: bool = True
+    ) -> Optimum:
         """Return a solved neighbour, read or solved now; see `Resolver.resolve`.
 
         Args:
             name: Name of its file, unique in the study.
             case: Its case.
             start: Neighbour to begin with.
+            insist: Whether to try for long.
 
         Raises:
             NotConvergedError: If the user stopped it: nothing further is wanted then.
@@ -62,7 +65,7 @@ class Journal:
         result = _read(path, seal)
         if result is not None:
             return self.resolver.restored(case, result)
-        optimum = self.resolver.resolve(case, start)
+        optimum = self.resolver.resolve(case, start, insist)
         self.solved += 1
         if optimum.result.status == "stopped by the user":
             raise NotConvergedError(STOPPED)

@@ -86,6 +86,19 @@ STUDIES: Final[dict[str, StudyEntry]] = {
         "pathwalker_cli.studies.uncertainty",
         parallel=True,
     ),
+    "learn": StudyEntry(
+        "learn",
+        "Learn from recordings how a child walks: tissue, strengths, and what its walking costs.",
+        """Learn the numbers with which predicted walking is nearest to the recorded one.
+
+        CONFIG is a YAML file or the name of a shipped one (learn): which numbers, with what is
+        thought of each before, and from which problem's recordings. DIR/learnt.yaml holds them
+        with their covariance; a config takes them by `learnt: FILE`. An interrupted call goes on
+        where it was. Exit codes: 0 done, 1 no prediction to begin with, 2 bad input.
+        """,
+        "Learning from recordings",
+        "pathwalker_cli.studies.learn",
+    ),
     "landscape": StudyEntry(
         "landscape",
         "Map the cost over the spring stiffnesses of a side.",
