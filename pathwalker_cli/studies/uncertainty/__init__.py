@@ -8,13 +8,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.errors import InputError, PatientError
+from pathwalker_cli.config.learnt import config_values
+from pathwalker_cli.errors import ConfigError, InputError, PatientError
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.io.fields import Quantity, invalid
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import (
     NeighbourStudy,
@@ -45,10 +46,19 @@ _EVERY: Final = 10
 class UncertaintyStudy(NeighbourStudy):
     """What is uncertain, and how often it is drawn."""
 
-    quantities: Annotated[dict[str, Distribution], Field(min_length=1)]
+    quantities: dict[str, Distribution] = Field(default_factory=dict)
+    learnt: bool = False
     draws: Annotated[int, Field(ge=2, le=100000)] = 100
     seed: Annotated[int, Field(ge=0)] = 0
     tolerance: Annotated[float, Quantity("", 1e-10, 1e-3)] = 1e-6
+
+    @model_validator(mode="after")
+    def _something(self) -> UncertaintyStudy:
+        if not self.quantities and not self.learnt:
+            raise invalid(
+                "draws nothing", allowed="quantities, learnt: true, or both of them",
+            )  # fmt: skip
+        return self
 
     def solved_as(self, case: Case) -> Case:
         """Return a case with the tolerance of the study."""
@@ -56,7 +66,14 @@ class UncertaintyStudy(NeighbourStudy):
 
     def drawn(self, case: Case) -> tuple[Draws, list[Case]]:
         """Return what is drawn, and the case of every draw; see `draw_cases`."""
-        draws = draw(inputs_of(self.quantities, case.unvaried), self.draws, self.seed)
+        learnt = case.config.learnt if self.learnt else None
+        if self.learnt and learnt is None:
+            raise ConfigError(
+                "is true, but the base has no learnt numbers", where="learnt",
+                mend="choose a base with `learnt: FILE`, e.g. predict-orthosis",
+            )  # fmt: skip
+        inputs = inputs_of(self.quantities, case.unvaried)
+        draws = draw(inputs, self.draws, self.seed, learnt)
         return draws, draw_cases(case, draws)
 
 
@@ -73,7 +90,8 @@ def draw_cases(case: Case, draws: Draws) -> list[Case]:
     cases = []
     for number in range(len(draws.values)):
         variation = case.config.variation.merged(draws.variation(number))
-        drawn = replace(case, config=case.config.model_copy(update={"variation": variation}))
+        drawn = case.with_values(config_values(draws.learnt(number)))
+        drawn = replace(drawn, config=drawn.config.model_copy(update={"variation": variation}))
         try:
             _ = drawn.patient
             if drawn.config.free:  # what is drawn may leave a range that no orthosis can have

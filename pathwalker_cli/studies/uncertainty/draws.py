@@ -1,4 +1,4 @@
-"""Draws of uncertain numbers of a patient: from distributions to variations, repeatably.
+"""Draws of uncertain numbers of a patient, of learnt ones as they go together, repeatably.
 
 References:
     McKay, Beckman and Conover (1979), Technometrics 21, 239-245: Latin hypercube sampling.
@@ -15,6 +15,7 @@ from pydantic import model_validator
 from scipy import stats
 from scipy.stats import qmc
 
+from pathwalker_cli.config.learnt import Learnt
 from pathwalker_cli.errors import ConfigError, InputError
 from pathwalker_cli.io.fields import Quantity, YamlModel, invalid
 from pathwalker_cli.patient import Patient
@@ -78,21 +79,23 @@ class Input:
     """One number, or one block of numbers that change together, that is drawn.
 
     Args:
-        place: Its place in the patient's file.
-        distribution: Its distribution.
+        place: Its place in the patient's file, or of a learnt number also in the config.
+        distribution: Its distribution; None of a learnt number, whose values are drawn.
     """
 
     place: str
-    distribution: Distribution
+    distribution: Distribution | None = None
 
     @property
     def relative(self) -> bool:
         """Whether factors are drawn, not shifts."""
-        return self.distribution.relative is not None
+        return self.distribution is not None and self.distribution.relative is not None
 
     @property
     def heading(self) -> str:
         """Name of its column."""
+        if self.distribution is None:
+            return f"{self.place} [learnt]"
         return f"{self.place} [{'factor' if self.relative else 'shift, SI'}]"
 
 
@@ -102,31 +105,49 @@ class Draws:
 
     Args:
         inputs: What is drawn.
-        values: Factors and shifts, shape (draws, inputs).
+        values: Factors and shifts, of learnt numbers values, shape (draws, inputs).
     """
 
     inputs: tuple[Input, ...]
     values: np.ndarray
 
     def variation(self, number: int) -> Variation:
-        """Return a draw as a variation of the patient's file."""
-        pairs = list(zip(self.inputs, self.values[number].tolist(), strict=True))
+        """Return a draw as a variation of the patient's file, learnt numbers apart."""
+        pairs = self._pairs(number, learnt=False)
         return Variation(
             scale={i.place: value for i, value in pairs if i.relative},
             shift={i.place: value for i, value in pairs if not i.relative},
         )
 
+    def learnt(self, number: int) -> dict[str, float]:
+        """Return the learnt numbers of a draw by place."""
+        return {i.place: value for i, value in self._pairs(number, learnt=True)}
 
-def draw(inputs: tuple[Input, ...], count: int, seed: int) -> Draws:
+    def _pairs(self, number: int, learnt: bool) -> list[tuple[Input, float]]:
+        pairs = zip(self.inputs, self.values[number].tolist(), strict=True)
+        return [(i, value) for i, value in pairs if (i.distribution is None) == learnt]
+
+
+def draw(
+    inputs: tuple[Input, ...], count: int, seed: int, learnt: Learnt | None = None
+) -> Draws:
     """Return draws by a Latin hypercube: every input goes evenly through its distribution.
 
     Args:
         inputs: What is drawn.
         count: Number of draws.
         seed: Equal seeds give equal draws.
+        learnt: Learnt numbers that are drawn too, from their covariance.
     """
-    cube = qmc.LatinHypercube(len(inputs), rng=np.random.default_rng(seed)).random(count)
-    columns = [i.distribution.amounts(cube[:, j]) for j, i in enumerate(inputs)]
+    size = 0 if learnt is None else len(learnt.numbers)
+    cube = qmc.LatinHypercube(len(inputs) + size, rng=np.random.default_rng(seed)).random(count)
+    columns = [i.distribution.amounts(cube[:, j]) for j, i in enumerate(inputs) if i.distribution]
+    if learnt is not None:
+        normal = stats.truncnorm.ppf(cube[:, len(inputs) :], -_TRUNCATION, _TRUNCATION)
+        roots = np.linalg.cholesky(np.array(learnt.covariance))
+        drawn = [learnt.at(roots @ row) for row in normal]
+        columns += [np.array([values[place] for values in drawn]) for place in learnt.numbers]
+        inputs = (*inputs, *(Input(place) for place in learnt.numbers))
     rounded = [[float(f"{x:.{_DIGITS}g}") for x in column] for column in columns]
     return Draws(inputs, np.array(rounded).T)
 

@@ -16,6 +16,7 @@ import numpy as np
 from scipy import stats
 
 from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.config.learnt import COST
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.results.text import spring_ends
@@ -34,6 +35,9 @@ _LISTED: Final = 5
 
 QUANTILES: Final = (0.05, 0.5, 0.95)
 """What stands for the distribution of a measure: the middle, and the range of 90 % of draws."""
+
+_OPEN: Final = 0.5
+"""Share of the allowed range that draws must cover for a spring to count as not determined."""
 
 _CHANCE: Final = 0.05
 """Probability that among inputs without any effect the strongest one is named all the same."""
@@ -232,7 +236,8 @@ def _write_draws(result: Uncertainty, path: Path) -> None:
     rows = []
     for number, end in enumerate(result.solved):
         variation = result.config.variation.merged(result.draws.variation(number))
-        text = json.dumps(variation.model_dump(mode="json"))
+        again = {**variation.model_dump(mode="json"), **result.draws.learnt(number)}
+        text = json.dumps(again)
         values = [end.values.get(m.key) for m in result.measures]
         drawn = result.draws.values[number].tolist()
         rows.append([number, *drawn, end.status, *values, end.iterations, end.seconds, text])
@@ -257,6 +262,7 @@ def uncertainty_lines(result: Uncertainty) -> Iterator[str]:
         yield from map(_row, all_spreads)
         yield ""
         yield from _limits(result, all_spreads)
+        yield from _advice(result, all_spreads)
         level = chance_level(converged, inputs)
         yield f"a correlation up to {level:.2f} may be chance among {inputs} inputs: none is named"
     yield ""
@@ -298,6 +304,36 @@ def _limits(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
         )
     if not any(low < high for low, high in result.ranges.values()):
         yield "no spring is free"
+
+
+def _advice(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
+    """Yield, of learnt numbers, which springs they leave open, and what to measure first.
+
+    What walking costs cannot be measured; tissue, range of motion and strength can.
+    """
+    rows = [i for i, entry in enumerate(result.draws.inputs)
+            if entry.distribution is None and not entry.place.startswith(COST)]  # fmt: skip
+    level = chance_level(len(result.converged), len(result.draws.inputs))
+    for spread in all_spreads:
+        low, high = result.ranges.get(spread.measure.key, (0.0, 0.0))
+        if not rows or not low < high:
+            continue
+        label, unit = spread.measure.label, spread.measure.unit
+        share = (spread.quantiles[2] - spread.quantiles[0]) / (high - low)
+        open_ = "not determined" if share > _OPEN else "determined"
+        text = (
+            f"{label}: {open_} by what was learnt, {spread.quantiles[0]:.0f} to "
+            f"{spread.quantiles[2]:.0f} {unit} in 90 % of the draws"
+        )
+        sizes = np.nan_to_num(np.abs(spread.correlations[rows]))
+        if sizes.any():
+            best = rows[int(np.argmax(sizes))]
+            chance = ", which may be chance" if sizes.max() <= level else ""
+            text += (
+                f"; what to measure first: {result.draws.inputs[best].place} (rank correlation "
+                f"{spread.correlations[best]:+.2f}{chance})"
+            )
+        yield text
 
 
 def _failures(result: Uncertainty) -> Iterator[str]:
