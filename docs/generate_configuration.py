@@ -42,6 +42,9 @@ STUDIES: Final[tuple[tuple[str, str, type[BaseModel]], ...]] = (
 ALLOWED: Final = {"problem": ", ".join(f"`{name}`" for name in PROBLEMS)}
 """Allowed values of keys that a validator checks."""
 
+FILES: Final = {"learnt"}
+"""Keys that name a file, whose content stands in a table of its own place."""
+
 NOT_SHIPPED: Final = {
     "smoke": "not for your own configs: `solve --smoke` writes `true` into the config of its run folder, which marks "
     "the run as a quick check wherever it is shown; set by hand it marks too, but makes no mesh coarser",
@@ -106,7 +109,8 @@ def _patient_file() -> Iterator[str]:
 
 def _tables(model: type[BaseModel], why: dict[str, str]) -> Iterator[str]:
     """Yield one table for the keys of a model and one for each model inside it."""
-    inner = {name: f for name, f in model.model_fields.items() if is_model(f.annotation)}
+    fields = model.model_fields.items()
+    inner = {name: f for name, f in fields if is_model(f.annotation) and name not in FILES}
     plain = {name: f for name, f in model.model_fields.items() if name not in inner}
     plain = dict(sorted(plain.items(), key=lambda entry: not entry[1].is_required()))
     yield _table(plain, "", why)

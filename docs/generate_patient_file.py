@@ -43,6 +43,8 @@ _ABOUT: Final = {
     "apart.",
     "strengths": "Maximum isometric torques. Needed for predictions, not for recorded gait; `pathwalker id` "
     "estimates them from recordings. Given, the block must be complete.",
+    "examination": "Passive range of motion from the couch, in degrees. Counts in problems with `model.tissue: true`; "
+    "what is left out is that of typical children.",
     "orthosis": "Needed for problems with orthoses. The same on both legs but for the stops. `orthosis:` may also "
     "be the path of a YAML file with this block, relative to the patient's file, that several patients share.",
     "recorded": "What was recorded, per condition: `recorded.barefoot` and `recorded.orthosis` have the same keys. "
@@ -90,6 +92,11 @@ MEANINGS: Final = {
     "strengths.ankle_flexion": "dorsiflexion",
     "strengths.lumbar_extension": "bends the trunk forward, as in the published model",
     "strengths.lumbar_flexion": "extends the trunk",
+    "examination.hip_extension": "Thomas test: extension of the hip with the other one flexed; typical 10",
+    "examination.popliteal_angle": "knee flexion left with the hip at 90, leg lifted until it resists; typical 26",
+    "examination.knee_extension": "negative where the knee does not straighten; typical 0",
+    "examination.dorsiflexion_knee_extended": "with the knee straight; typical 13",
+    "examination.dorsiflexion_knee_flexed": "with the knee at 90; typical 32",
     "orthosis.mass.shank": "what orthosis and shoe add to each shank",
     "orthosis.mass.foot": "the same of each foot",
     "orthosis.neutral_angle": "ankle angle at which the springs give no torque",

@@ -97,7 +97,9 @@ class MadeResolver:
     def optimum(self) -> MadeOptimum:
         return self.restored(self.case, self.end(self.case, 0.0, "converged"))
 
-    def resolve(self, case: Case, start: MadeOptimum | None = None) -> MadeOptimum:
+    def resolve(
+        self, case: Case, start: MadeOptimum | None = None, insist: bool = True
+    ) -> MadeOptimum:
         self.solved.append(case)
         start = start or self.optimum
         far = np.linalg.norm(np.log(start.stiffness / MadeOptimum(case, start.result).stiffness))

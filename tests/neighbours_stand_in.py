@@ -65,7 +65,9 @@ class StandInResolver:
     def optimum(self) -> StandInOptimum:
         return StandInOptimum(self.case, made_result())
 
-    def resolve(self, case: Case, start: StandInOptimum | None = None) -> StandInOptimum:
+    def resolve(
+        self, case: Case, start: StandInOptimum | None = None, insist: bool = True
+    ) -> StandInOptimum:
         self.solved.append(case)
         status = "the iteration limit was reached" if self.fails(case.config) else "converged"
         return StandInOptimum(case, replace(made_result(), status=status))

@@ -87,7 +87,7 @@ def test_check_tells_of_it(copy: Path) -> None:
     output = run(
         copy, "-c", "from pathwalker_cli.cli import main; main()", "check", "extended.yaml"
     )
-    for label in ("knee_tissue_stiffness: [1, 10] N m/rad", "neutral_angle: [-0.05, 0.03] rad"):
+    for label in ("knee_band_stiffness: [1, 10] N m/rad", "neutral_angle: [-0.05, 0.03] rad"):
         assert label in " ".join(output.split())
 
 

@@ -179,7 +179,7 @@ def test_a_new_study_is_a_module_and_an_entry(made_runs: Path, tmp_path: Path) -
     assert refused.returncode == 2
     assert "follows a recording" in refused.stderr
     unknown = registered("report", tmp_path, "-o", "page.html", here=tmp_path)
-    assert "uncertainty or speeds of pathwalker wrote" in unknown.stderr
+    assert "learn or speeds of pathwalker wrote" in unknown.stderr
 
 
 def test_a_new_study_stands_on_a_page(made_runs: Path, tmp_path: Path) -> None:

@@ -255,10 +255,10 @@ def test_a_killed_study_goes_on_where_it_was(
 ) -> None:
     solve = resolver.resolve
 
-    def dying(case: Any, start: Any = None) -> StandInOptimum:
+    def dying(case: Any, start: Any = None, insist: bool = True) -> StandInOptimum:
         if len(resolver.solved) == 7:
             raise KeyboardInterrupt
-        return solve(case, start)
+        return solve(case, start, insist)
 
     monkeypatch.setattr(resolver, "resolve", dying)
     assert call().exit_code != 0

@@ -47,6 +47,8 @@ pathwalker id inverse-dynamics --out runs/torques
 pathwalker id inverse-dynamics.yaml --update-patient
 pathwalker init my-child
 pathwalker init my-child --age 8 --mass 26.5 --height 1.27
+pathwalker learn learn --out runs/learn
+pathwalker learn learn --set steps=4 --set "without=[T1, T2]"
 pathwalker init try-it --example
 pathwalker check my-child/patient.yaml my-child/mapd-orthosis.yaml
 pathwalker check mapd-orthosis landscape --json

@@ -93,9 +93,7 @@ class Learnt(YamlModel):
     condition: Condition
     origin: str = ""
     numbers: Annotated[dict[str, LearntNumber], Field(min_length=1)]
-    covariance: Annotated[
-        tuple[Annotated[tuple[float, ...], AS_TUPLE], ...], AS_TUPLE
-    ]
+    covariance: Annotated[tuple[Annotated[tuple[float, ...], AS_TUPLE], ...], AS_TUPLE]
 
     @model_validator(mode="after")
     def _square(self) -> Learnt:

@@ -15,7 +15,6 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.cost_terms import cost_terms, goal_values
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.atomic import refuse_special
-from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.nlp.optimality import optimality
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.results.metrics import METRICS_HASH, metrics_hash, sha256

@@ -36,6 +36,7 @@ from pathwalker_cli.io.fields import Quantity, YamlModel
 from pathwalker_cli.nlp.kkt import Answer
 from pathwalker_cli.ocp.violations import active_bounds
 from pathwalker_cli.results.run_folder import Run
+from pathwalker_cli.stride.stride import Stride, stride_of
 from pathwalker_cli.studies.base import NeighbourStudy, Plan, StudyKind, Work, resolver_of
 from pathwalker_cli.studies.learn.result import (
     FILES,
@@ -47,7 +48,6 @@ from pathwalker_cli.studies.learn.result import (
 )
 from pathwalker_cli.studies.learn.targets import Target, residuals, targets_of
 from pathwalker_cli.studies.neighbours import STOPPED, Journal
-from pathwalker_cli.stride.stride import Stride, stride_of
 
 STEPS: Final = "steps"
 """Folder of the predictions that were solved on the way."""

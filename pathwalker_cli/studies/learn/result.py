@@ -241,8 +241,10 @@ def learn_lines(result: LearnResult) -> Iterator[str]:
     acting = ", ".join(result.active) or "none"
     yield f"\nranges that hold the result: {acting}"
     starts = ", ".join(f"{misfit:.2f}" for misfit in result.misfits)
-    yield f"misfit by start: {starts} (of the best, distance from the priors "\
-          f"{result.prior_misfit:.2f})"
+    yield (
+        f"misfit by start: {starts} (of the best, distance from the priors "
+        f"{result.prior_misfit:.2f})"
+    )
     yield (f"{result.solves} predictions, {result.iterations} iterations, "
            f"{result.cpu_seconds:.0f} CPU s after the first")  # fmt: skip
 

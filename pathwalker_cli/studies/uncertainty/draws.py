@@ -128,9 +128,7 @@ class Draws:
         return [(i, value) for i, value in pairs if (i.distribution is None) == learnt]
 
 
-def draw(
-    inputs: tuple[Input, ...], count: int, seed: int, learnt: Learnt | None = None
-) -> Draws:
+def draw(inputs: tuple[Input, ...], count: int, seed: int, learnt: Learnt | None = None) -> Draws:
     """Return draws by a Latin hypercube: every input goes evenly through its distribution.
 
     Args:

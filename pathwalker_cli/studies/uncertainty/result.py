@@ -236,8 +236,7 @@ def _write_draws(result: Uncertainty, path: Path) -> None:
     rows = []
     for number, end in enumerate(result.solved):
         variation = result.config.variation.merged(result.draws.variation(number))
-        again = {**variation.model_dump(mode="json"), **result.draws.learnt(number)}
-        text = json.dumps(again)
+        text = json.dumps(variation.model_dump(mode="json"))
         values = [end.values.get(m.key) for m in result.measures]
         drawn = result.draws.values[number].tolist()
         rows.append([number, *drawn, end.status, *values, end.iterations, end.seconds, text])
