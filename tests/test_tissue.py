@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 from pathwalker_cli.case import load_case
+from pathwalker_cli.inverse.strengths import strength_table
+from pathwalker_cli.inverse.study import InverseDynamicsConfig
+from pathwalker_cli.inverse.trials import recorded_trials
 from pathwalker_cli.model.elements.tissue import _EXAMINATION, passive_torques
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import Patient, load_patient
@@ -135,3 +138,20 @@ def test_numbers_of_a_config_stand_over_the_patient_and_below_its_variation() ->
     assert values["strengths.ankle_extension.left"] == 40.0
     assert values["strengths.ankle_extension.right"] == pytest.approx(32.32569)
     assert values["tissue.damping"] == 0.4
+
+
+def test_strengths_are_of_what_muscles_give() -> None:
+    """A stiffer ankle carries more of the recorded torque: it takes a weaker muscle."""
+    patient = load_patient("sreenivasa2017-patient")
+    stiff = patient.model_copy(update={"numbers": {"tissue.ankle_stiffness": 2.0}})
+    config = InverseDynamicsConfig(
+        study="inverse-dynamics", patient=patient.id, conditions=("barefoot",)
+    )
+    trials = recorded_trials(config, patient, "barefoot", lambda _: None)
+    with_tissue = config.model_copy(update={"tissue": True})
+    tables = (
+        strength_table(trials, who, each)
+        for who, each in ((patient, config), (patient, with_tissue), (stiff, with_tissue))
+    )
+    ankles = [{r.generator: r.value for r in t.rows}["ankle_extension_r"] for t in tables]
+    assert ankles[0] > ankles[1] > ankles[2] > 0.0

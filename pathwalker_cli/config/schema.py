@@ -70,6 +70,9 @@ def _as_text(value: Any) -> Any:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
+TrialName = Annotated[str, BeforeValidator(_as_text)]
+
+
 class ModelConfig(YamlModel):
     """Which model is built."""
 
@@ -177,7 +180,7 @@ class StartConfig(YamlModel):
     """Where the search begins."""
 
     gait: Literal["synthetic", "recorded"] = "synthetic"
-    trial: Annotated[str, BeforeValidator(_as_text)] = ""
+    trial: TrialName = ""
     condition: Condition = "barefoot"
     knee_flexion: Annotated[float, Quantity("rad", 0.05, 1.5, above="is it in degrees?")] = 0.7
     stride_ratio: Annotated[float, Quantity("leg lengths", 0.3, 3.0)] = 1.1

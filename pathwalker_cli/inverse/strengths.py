@@ -28,6 +28,7 @@ from pathwalker_cli.inverse.study import InverseDynamicsConfig
 from pathwalker_cli.inverse.trials import Trial
 from pathwalker_cli.io.fields import Sides
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, curves_of, generators
+from pathwalker_cli.model.elements.tissue import passive_series
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import Strengths
 
@@ -100,7 +101,7 @@ def strength_table(
         config: What counts as uncertain.
     """
     barefoot = [t for t in trials if t.condition == "barefoot" and t.tau is not None]
-    curves = stance_curves(barefoot, config.motion_cutoff)
+    curves = stance_curves(barefoot, config.motion_cutoff, patient if config.tissue else None)
     peaks = extension_peaks(curves, any(trial.published for trial in barefoot))
     try:
         strengths = strengths_of(peaks)
@@ -120,7 +121,7 @@ def strength_table(
 
 
 def stance_curves(
-    trials: Sequence[Trial], cutoff: float = MOTION_CUTOFF
+    trials: Sequence[Trial], cutoff: float = MOTION_CUTOFF, patient: Patient | None = None
 ) -> dict[str, list[np.ndarray]]:
     """Return torque, angle and speed of every leg joint over every measured stance.
 
@@ -129,6 +130,7 @@ def stance_curves(
     Args:
         trials: Trials without an orthosis, whose torque would add to the muscles'.
         cutoff: Cut-off frequency of the motion [Hz], that of the torques.
+        patient: Whose passive torques are not the muscles'; None to leave them in.
 
     Returns:
         Per coordinate, arrays of shape (POINTS, 3): torque [N m], angle [rad], speed [rad/s].
@@ -144,10 +146,12 @@ def stance_curves(
         else:
             q, v, _ = smooth_rates(motion, cutoff)
             spans = [(s.stance.side, s.stance.rows) for s in trial.stances if s.measured]
+        passive = {} if patient is None else passive_series(patient, motion.names, q, v)
         for side, rows in spans:
             for name in (f"{joint}_{SUFFIX[side]}" for joint in LEG_JOINTS):
                 column = motion.names.index(name)
-                parts = (trial.tau[name][rows], q[rows, column], v[rows, column])
+                torque = trial.tau[name] - passive.get(name, 0.0)
+                parts = (torque[rows], q[rows, column], v[rows, column])
                 curve = np.stack(parts, axis=1)
                 if np.isfinite(curve).all():
                     curves.setdefault(name, []).append(resampled(curve))

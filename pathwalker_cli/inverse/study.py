@@ -81,6 +81,7 @@ class InverseDynamicsConfig(RecordedConfig):
     trials: tuple[str, ...] = ()
     method: Literal["default", "published"] = "default"
     motion_cutoff: Annotated[float, Quantity("Hz", 1.0, 50.0)] = MOTION_CUTOFF
+    tissue: bool = False
     least_frames: Annotated[int, Field(ge=1, le=10000)] = 20
     least_stances: Annotated[int, Field(ge=1, le=1000)] = 3
     angle_error: Annotated[float, Quantity("rad", 0.0, 0.5, above="is it in degrees?")] = 0.09

@@ -69,7 +69,7 @@ def forces_table(series: GaitSeries) -> Trajectory:
 
 
 def torques_table(series: GaitSeries) -> Trajectory:
-    """Return torques of generators and orthoses and their sum per joint over time."""
+    """Return torques of generators, orthoses and tissue, and the sum per joint over time."""
     orthoses = [f"orthosis_{SUFFIX[side]}" for side in SIDES]
     joints = [name for name in COORDINATES if name not in ROOT]
     net = series.net_torque[:, [COORDINATES.index(name) for name in joints]]
@@ -77,6 +77,7 @@ def torques_table(series: GaitSeries) -> Trajectory:
         series,
         _columns(GENERATORS, "_torque", "N m", series.muscle_torque),
         _columns(orthoses, "_torque", "N m", series.orthosis_torque),
+        [(f"{name}_passive_torque", "N m", x) for name, x in series.passive_torque.items()],
         _columns(joints, "_net_torque", "N m", net),
     )
 

@@ -63,6 +63,17 @@ class GaitSeries:
             return np.zeros((len(self.time), len(SIDES)))
         return self.element_force[:, self.walker.columns(self.walker.device.forces)]
 
+    @cached_property
+    def passive_torque(self) -> dict[str, np.ndarray]:
+        """Torque of passive tissue by coordinate [N m], each (n,); empty without tissue."""
+        tissue = self.walker.tissue
+        names = [name for element in tissue for name in element.coordinates]
+        columns = self.element_force[:, self.walker.columns(tissue)].T
+        sums: dict[str, np.ndarray] = {}
+        for name, column in zip(names, columns, strict=True):
+            sums[name] = sums[name] + column if name in sums else column
+        return sums
+
     @property
     def stiffness(self) -> np.ndarray:
         """K_D right, left, K_P right, left [N m/rad], shape (4,); empty when barefoot."""

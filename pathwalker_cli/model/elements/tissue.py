@@ -10,7 +10,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
@@ -108,7 +108,8 @@ class LegTissue:
         """Return the torques on hip, knee and ankle [N m]; see `ForceElement.forces`."""
         own = {name: numbers[number.address] for name, number in self._own.items()}
         size, damping = (numbers[number.address] for number in SHARED)
-        torques = passive_torques(*(state.q[name] for name in self.coordinates), own)
+        hip, knee, ankle = (state.q[name] for name in self.coordinates)
+        torques = passive_torques(hip, knee, ankle, own)
         factors = (size * own[f"passive_{joint}_stiffness"] for joint in _JOINTS)
         speeds = (state.v[name] for name in self.coordinates)
         each = zip(factors, torques, speeds, strict=True)
@@ -164,6 +165,25 @@ def _exponential(x: Any) -> Any:
     over = x - low
     grown = ca.exp(low) if isinstance(x, ca.SX | ca.MX) else np.exp(low)
     return grown * (1.0 + over + over * over / 2.0)
+
+
+def passive_series(
+    patient: Patient, names: Sequence[str], q: np.ndarray, v: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the passive torques of a patient's legs at m instants [N m], by coordinate.
+
+    Args:
+        patient: The patient.
+        names: Names of the coordinates.
+        q: Generalised coordinates [m, rad], shape (m, len(names)).
+        v: Generalised velocities [m/s, rad/s], likewise.
+    """
+    angles, speeds = (dict(zip(names, x.T, strict=True)) for x in (q, v))
+    state = State(angles, speeds, {})
+    elements = leg_tissue()
+    values = {n.address: n.value_for(patient) for each in elements for n in each.numbers}
+    torques = [(each, each.forces(state, values)) for each in elements]
+    return {name: x for each, xs in torques for name, x in zip(each.coordinates, xs, strict=True)}
 
 
 def leg_tissue() -> tuple[LegTissue, ...]:

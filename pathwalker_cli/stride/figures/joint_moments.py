@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX
+from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side
 from pathwalker_cli.stride.figures.curves import EXTENSION, Reference, draw_band, draw_sides
 from pathwalker_cli.stride.figures.style import (
     LINE_COLOUR,
@@ -36,8 +37,9 @@ _TITLES: Final = {
 def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Figure:
     """Return net moments at hip, knee and ankle over the gait cycle of each side.
 
-    Internal moments, of muscles and orthosis on the joint, over mass with the orthosis; extension
-    and plantarflexion are positive.  Thin lines at the ankle are the part of the orthosis.
+    Internal moments, of muscles, tissue and orthosis on the joint, over mass with the orthosis;
+    extension and plantarflexion are positive.  Thin lines at the ankle are the part of the
+    orthosis, dotted ones that of passive tissue.
 
     Args:
         series: The stride.
@@ -56,18 +58,29 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
         zero_line(ax)
         draw_sides(ax, series, values)
         percent_axis(ax)
-        if joint == "ankle" and series.walker.orthosis:
-            _draw_orthosis(ax, series, factor)
+        for side in SIDES:
+            name, look = f"{joint}_{SUFFIX[side]}", {"linewidth": 0.9, "linestyle": ":"}
+            if name in series.passive_torque:
+                _draw_part(ax, series, side, factor * series.passive_torque[name], look)
+            if joint == "ankle" and series.walker.orthosis:
+                worn = factor * series.orthosis_torque[:, SIDES.index(side)]
+                _draw_part(ax, series, side, worn, {"linewidth": 0.7})
     handles = [*side_handles(), events_handle(), *([band_handle()] if bands else [])]
     if series.walker.orthosis:
         handles.append(Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis alone"))
+    if series.passive_torque:
+        handles.append(Line2D([], [], color=NEUTRAL, linestyle=":", linewidth=0.9,
+                              label="dotted: passive tissue alone"))  # fmt: skip
     legend_panel(panels[-1], handles)
     return fig
 
 
-def _draw_orthosis(ax: Axes, series: GaitSeries, factor: float) -> None:
-    """Draw the torques of the orthoses as thin lines."""
-    for i, side in enumerate(SIDES):
-        cycle, torque = own_cycle(series, side), factor * series.orthosis_torque[:, i]
-        colour, style = LINE_COLOUR[side], LINE_STYLE[side]
-        ax.plot(cycle.percent, torque[cycle.index], color=colour, linestyle=style, linewidth=0.7)
+def _draw_part(
+    ax: Axes, series: GaitSeries, side: Side, moment: np.ndarray, look: dict[str, Any]
+) -> None:
+    """Draw a part of the net moment of a side, shape (n,)."""
+    cycle, own = (
+        own_cycle(series, side),
+        {"color": LINE_COLOUR[side], "linestyle": LINE_STYLE[side]},
+    )
+    ax.plot(cycle.percent, moment[cycle.index], **(own | look))

@@ -28,6 +28,7 @@ from scipy.optimize import least_squares
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config.learnt import COST, Learnt, LearntNumber, Prior, config_values
+from pathwalker_cli.config.schema import TrialName
 from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError, did_you_mean
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
 from pathwalker_cli.gait.resolve import Optimum, Resolver
@@ -74,7 +75,7 @@ class LearnStudy(NeighbourStudy):
 
     numbers: Annotated[dict[str, Prior], Field(min_length=1)]
     weights: Weights = Weights()
-    without: tuple[str, ...] = ()
+    without: tuple[TrialName, ...] = ()
     steps: Annotated[int, Field(ge=1, le=200)] = 12
     precision: Annotated[float, Quantity("", 1e-8, 1e-1)] = 1e-3
     starts: Annotated[int, Field(ge=1, le=50)] = 1

@@ -133,42 +133,42 @@ def left_out_errors(
     """
     rows, at = {}, 0
     for target in targets:
-        scale = target.spread * np.sqrt(target.mean.size) / target.weight
-        rows[target.name] = slopes[at : at + target.mean.size] * scale
-        at += target.mean.size
-    trials = sorted({s.name for side in SIDES for s in recorded.of("stride", side)})
-    errors: list[tuple[float, float]] = []
-    for trial in trials:
-        rest = targets_without(recorded, (trial,))
-        if len(trials) < 2 or not all(t.name in rows for t in rest):
-            continue
-        matrix = [rows[t.name] * t.weight / t.spread / np.sqrt(t.mean.size) for t in rest]
-        jacobian, misses = np.vstack(matrix), np.concatenate([t.residual(stride) for t in rest])
+        size = target.mean.size
+        rows[target.name] = slopes[at : at + size] / target.scale
+        at += size
+    trials = sorted({each.name for side in SIDES for each in recorded.of("stride", side)})
+    errors = []
+    for trial in trials if len(trials) > 1 else ():
+        rest = {t.name: t for t in targets_without(recorded, (trial,)) if t.name in rows}
+        jacobian = np.vstack([rows[name] * target.scale for name, target in rest.items()])
+        misses = np.concatenate([target.residual(stride) for target in rest.values()])
         normal = jacobian.T @ jacobian + np.eye(deviations.size)
         step = -np.linalg.solve(normal, jacobian.T @ misses + deviations)
-        means = {target.name: target.mean for target in rest}
-        learnt, own = [], []
-        for curve in ANGLES:
-            squares: list[tuple[float, float]] = []
-            for side in SIDES:
-                name = f"{curve.key}_{side}"
-                target = next((t for t in rest if t.name == name), None)
-                for line in cycles(recorded, curve, side).get(trial, ()):
-                    if target is not None:
-                        predicted = target.of(stride) + rows[name] @ step
-                        squares.append((
-                            float(np.mean((predicted - line) ** 2)),
-                            float(np.mean((means[name] - line) ** 2)),
-                        ))  # fmt: skip
-            if squares:
-                learnt.append(np.sqrt(np.mean([s[0] for s in squares])))
-                own.append(np.sqrt(np.mean([s[1] for s in squares])))
-        if learnt:
-            errors.append((float(np.mean(learnt)), float(np.mean(own))))
+        taught = {name: t.of(stride) + rows[name] @ step for name, t in rest.items()}
+        means = {name: target.mean for name, target in rest.items()}
+        errors.append([_missed(recorded, trial, curves) for curves in (taught, means)])
     if not errors:
         return None
-    mean = np.deg2rad(np.mean(errors, axis=0))  # the curves are in degrees
-    return LeftOut(float(mean[0]), float(mean[1]), len(errors))
+    learnt, own = np.nanmean(errors, axis=0)
+    return LeftOut(float(learnt), float(own), len(errors))
+
+
+def _missed(recorded: RecordedGait, trial: str, curves: Mapping[str, np.ndarray]) -> float:
+    """Return the RMS difference of the angles of a trial's cycles to curves, mean of joints [rad].
+
+    NaN if the trial shows no cycle that there is a curve for.
+    """
+    joints = []
+    for angle in ANGLES:
+        squares = [
+            np.mean((curves[name] - line) ** 2)
+            for side in SIDES
+            if (name := f"{angle.key}_{side}") in curves
+            for line in cycles(recorded, angle, side).get(trial, ())
+        ]
+        if squares:
+            joints.append(np.deg2rad(np.sqrt(np.mean(squares))))  # the curves are in degrees
+    return float(np.mean(joints)) if joints else float("nan")
 
 
 def write_learnt(result: LearnResult, folder: Path) -> None:

@@ -57,14 +57,18 @@ class Target:
     weight: float
     of: Callable[[Stride], np.ndarray]
 
+    @property
+    def scale(self) -> float:
+        """Weighed deviations per unit of the curve."""
+        return float(self.weight / self.spread / np.sqrt(self.mean.size))
+
     def residual(self, stride: Stride) -> np.ndarray:
         """Return the weighed deviations of a stride, whose squares add up to their mean, (k,)."""
-        deviation = (self.of(stride) - self.mean) / self.spread
-        return np.asarray(self.weight * deviation / np.sqrt(self.mean.size))
+        return np.asarray(self.scale * (self.of(stride) - self.mean))
 
 
 def targets_of(
-    recorded: RecordedGait, weights: Mapping[Group, float], without: Collection[str] = ()
+    recorded: RecordedGait, weights: Mapping[str, float], without: Collection[str] = ()
 ) -> tuple[Target, ...]:
     """Return all that recordings say of a stride.
 
