@@ -161,7 +161,7 @@ def test_further_factors_start_from_nearer_ones(
     monkeypatch.setattr(
         resolver,
         "resolve",
-        lambda case, start: (starts.append(start.config), solve(case, start))[1],
+        lambda case, start, insist: (starts.append(start.config), solve(case, start, insist))[1],
     )
     study = PerturbationStudy(
         base="x", factors=(0.8, 1.2, 0.9), springs=("dorsiflexion_stiffness_left",)

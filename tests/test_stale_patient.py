@@ -16,6 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
@@ -32,9 +33,12 @@ from pathwalker_cli.gait.neighbourhood import Derivative
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.results.run_folder import Run
+from pathwalker_cli.stride.series import gait_series
+from pathwalker_cli.stride.stride import Stride, stride_of
 from pathwalker_cli.stride.verify import reintegrate
 from pathwalker_cli.studies import (
     landscape,
+    learn,
     neighbours,
     perturbation,
     sensitivity,
@@ -65,6 +69,7 @@ WORDS: dict[str, tuple[str, ...]] = {
                   "--set", "dorsiflexion.points=2", "--set", "plantarflexion.points=2"),
     "tradeoff": ("tradeoff", "--run", "worn", "--out", "out",
                  "--set", "walking_speed_weights=[0.0, 1.0]"),
+    "learn": ("learn", "--run", "bare", "--out", "out", "--set", "steps=1", "--set", "set={}"),
     "evaluate": ("worn", "bare", "-o", "out"),
     "verify": ("worn",),
     "rerun": ("worn", "--out", "out"),
@@ -124,6 +129,16 @@ class Around:
         return Derivative(1e-3 * kg(self.optimum), self.optimum, self.optimum, 1e-4)
 
 
+def made_stride(made_solution: Callable[..., GaitSolution], case: Case) -> Stride:
+    solution = made_solution(case.config.problem, case=case, walker=case.walker())
+    return stride_of(gait_series(solution.walker, solution.last_motion))
+
+
+def no_slopes(learner: Any, deviations: np.ndarray) -> np.ndarray:
+    size = learner.misfit(deviations).size - deviations.size
+    return np.vstack([np.zeros((size, deviations.size)), np.eye(deviations.size)])
+
+
 class HereAndNow:
     """A pool of this very process."""
 
@@ -169,6 +184,10 @@ def quick(monkeypatch: pytest.MonkeyPatch, made_solution: Callable[..., GaitSolu
         monkeypatch.setattr(place, "measures", numbers)
     monkeypatch.setattr(sensitivity, "Neighbourhood", Around)
     monkeypatch.setattr(sensitivity, "all_measures", lambda o: {"cost": 0.01 * kg(o)})
+    monkeypatch.setattr(learn, "resolver_of", lambda run: MadeResolver(run.case))
+    monkeypatch.setattr(learn, "stride_at", lambda o: made_stride(made_solution, o.case))
+    monkeypatch.setattr(learn, "_bounds_that_act", lambda *_: ())
+    monkeypatch.setattr(learn._Learner, "slopes", no_slopes)
     for place in (landscape, tradeoff):
         monkeypatch.setattr(
             place, "measures", lambda o: {**made_measures(o), "stride_time": 0.03 * kg(o)}
