@@ -190,10 +190,17 @@ class KktSystem:
     @cached_property
     def _gradient(self) -> np.ndarray:
         """Gradient of the Lagrangian without the bounds on the unknowns, shape (n,)."""
-        return self._first_order(self.program)[1]
+        return self._own_first_order[1]
+
+    @cached_property
+    def _own_first_order(self) -> tuple[float, np.ndarray, np.ndarray]:
+        return self._first_order_of(self.program)
 
     def _first_order(self, program: Program) -> tuple[float, np.ndarray, np.ndarray]:
         """Return objective, gradient of the Lagrangian and rows of a program at the optimum."""
+        return self._own_first_order if program is self.program else self._first_order_of(program)
+
+    def _first_order_of(self, program: Program) -> tuple[float, np.ndarray, np.ndarray]:
         x, p = self.result.unknowns, program.parameters
         objective, gradient = self._functions["grad_f"](x, p)
         rows, jacobian = self._functions["jac_g"](x, p)

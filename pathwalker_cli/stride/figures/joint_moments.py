@@ -70,7 +70,7 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
         handles.append(Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis alone"))
     if series.passive_torque:
         handles.append(Line2D([], [], color=NEUTRAL, linestyle=":", linewidth=0.9,
-                              label="dotted: passive tissue alone"))  # fmt: skip
+                              label="dotted: tissue alone"))  # fmt: skip
     legend_panel(panels[-1], handles)
     return fig
 

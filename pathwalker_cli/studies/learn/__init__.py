@@ -53,8 +53,8 @@ from pathwalker_cli.studies.neighbours import STOPPED, Journal
 STEPS: Final = "steps"
 """Folder of the predictions that were solved on the way."""
 
-_STEP: Final = 1e-3
-"""Difference by which derivatives of the problem are taken [prior standard deviations]."""
+_STEP: Final = 1e-4
+"""Forward difference by which derivatives of the problem are taken [prior standard deviations]."""
 _AT_END: Final = 0.01
 """Distance from an end of its range at which a number sits there [prior deviations]."""
 _DIGITS: Final = 9
@@ -187,18 +187,13 @@ class _Learner:
         """Return the derivatives of `misfit` by all numbers."""
         optimum = self.optimum(deviations)
         answers, columns = [], []
+        here = residuals(self.targets, stride_at(optimum))
         for step in _STEP * np.eye(deviations.size):
-            ends = [
-                self.resolver.restored(self.case_at(deviations + sign * step), optimum.result)
-                for sign in (-1, 1)
-            ]
-            answer = optimum.kkt.answer(ends[0].program, ends[1].program, _STEP)
-            below, above = (
-                residuals(self.targets, stride_at(_moved(end, sign * _STEP * answer.unknowns)))
-                for sign, end in zip((-1, 1), ends, strict=True)
-            )
+            end = self.resolver.restored(self.case_at(deviations + step), optimum.result)
+            answer = optimum.kkt.answer(optimum.program, end.program, _STEP / 2.0)
+            there = residuals(self.targets, stride_at(_moved(end, _STEP * answer.unknowns)))
             answers.append(answer)
-            columns.append((above - below) / (2.0 * _STEP))
+            columns.append((there - here) / _STEP)
         self._at = deviations.copy(), optimum, answers
         self._tell(deviations, optimum)
         return np.vstack([np.array(columns).T, np.eye(deviations.size)])
