@@ -268,6 +268,7 @@ def test_a_second_call_solves_nothing_again(learnt: tuple[Path, Result], run: Ru
         (("without=[T99]",), "'T99', which does not exist"),
         (("numbers={tissue.dampin: {prior: 1, spread: 1, range: [0, 2]}}",), "tissue.damping"),
         (("set={learnt: null, patient: sreenivasa2017-healthy}",), "no recordings to learn from"),
+        (("set={learnt: null, variation.scale: {body_mass: 1.6}}",), "times the weight of this"),
     ],
 )
 def test_what_cannot_be_learnt_is_refused(

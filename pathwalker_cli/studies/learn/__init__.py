@@ -47,7 +47,7 @@ from pathwalker_cli.studies.learn.result import (
     left_out_errors,
     write_learnt,
 )
-from pathwalker_cli.studies.learn.targets import Target, residuals, targets_of
+from pathwalker_cli.studies.learn.targets import Target, carried_weight, residuals, targets_of
 from pathwalker_cli.studies.neighbours import STOPPED, Journal
 
 STEPS: Final = "steps"
@@ -57,6 +57,8 @@ _STEP: Final = 1e-4
 """Forward difference by which derivatives of the problem are taken [prior standard deviations]."""
 _AT_END: Final = 0.01
 """Distance from an end of its range at which a number sits there [prior deviations]."""
+_WEIGHT_OFF: Final = 0.2
+"""Share of the weight by which the load of both feet may be off: strides are not quite periodic."""
 _DIGITS: Final = 9
 """Significant digits of the numbers that are tried: a restart asks for the very same."""
 
@@ -70,6 +72,9 @@ class Weights(YamlModel):
     walk: Annotated[float, Quantity("", 0.0, 100.0)] = 1.0
 
 
+Barrier = Annotated[float, Quantity("", 0.0, 1.0)]
+
+
 class LearnStudy(NeighbourStudy):
     """What is learnt, from which recordings."""
 
@@ -78,6 +83,7 @@ class LearnStudy(NeighbourStudy):
     without: tuple[TrialName, ...] = ()
     steps: Annotated[int, Field(ge=1, le=200)] = 12
     precision: Annotated[float, Quantity("", 1e-8, 1e-1)] = 1e-3
+    smoothing: Annotated[tuple[Barrier, ...], Field(min_length=1)] = (1e-3, 0.0)
     starts: Annotated[int, Field(ge=1, le=50)] = 1
     seed: Annotated[int, Field(ge=0)] = 0
 
@@ -113,6 +119,13 @@ class LearnStudy(NeighbourStudy):
                 "the recordings do not show a whole gait cycle of both sides", where=who,
                 allowed="at least one from foot strike to foot strike on each side",
             )  # fmt: skip
+        share = carried_weight(recorded, self.without)
+        if share is not None and abs(share - 1.0) > _WEIGHT_OFF:
+            raise DataError(
+                f"both feet together carry {share:.2f} times the weight of this walker on average",
+                where=who, allowed=f"1 within {_WEIGHT_OFF:g}: the recordings' own body",
+                mend="correct body_mass, or take the recordings of this child",
+            )  # fmt: skip
         return recorded
 
     def targets(self, recorded: RecordedGait, without: Collection[str] = ()) -> tuple[Target, ...]:
@@ -131,6 +144,8 @@ class _Learner:
         resolver: Solves neighbours of the first prediction.
         journal: Keeps what was solved.
         report: Hears of every step.
+        name: Beginning of the names in the journal.
+        begin: The prediction to begin with; the first one if left out.
     """
 
     study: LearnStudy
@@ -139,7 +154,8 @@ class _Learner:
     resolver: Resolver
     journal: Journal
     report: Any
-    start: int = 0
+    name: str = "start-00"
+    begin: Optimum | None = None
     solves: int = 0
     iterations: int = 0
     _known: dict[bytes, Optimum] = field(default_factory=dict)
@@ -158,7 +174,7 @@ class _Learner:
         """Return the prediction, solved from the last one that was accepted."""
         key = deviations.tobytes()
         if key not in self._known:
-            name = f"start-{self.start:02d}-{len(self._known):03d}"
+            name = f"{self.name}-{len(self._known):03d}"
             begin = self._extrapolated(deviations)
             optimum = self.journal.resolve(name, self.case_at(deviations), begin, insist=False)
             self.solves += 1
@@ -169,7 +185,7 @@ class _Learner:
     def _extrapolated(self, deviations: np.ndarray) -> Optimum | None:
         """Return where the derivatives at the last step say that the optimum is."""
         if self._at is None:
-            return None
+            return self.begin
         last, optimum, answers = self._at
         steps = zip(answers, deviations - last, strict=True)
         unknowns = optimum.result.unknowns + sum(a.unknowns * step for a, step in steps)
@@ -259,14 +275,24 @@ def learn(study: LearnStudy, run: Run, work: Work) -> LearnResult:
     """
     began, used = time.perf_counter(), time.process_time()
     case = run.case
-    resolver = resolver_of(run)
-    journal = Journal(work.folder / STEPS, run, resolver)
     recorded = study.recorded(GaitSolver(case))
     targets = study.targets(recorded)
+    learners: list[_Learner] = []
     ends = []
     for start, at in enumerate(_starts(study)):
-        learner = _Learner(study, case, targets, resolver, journal, work.report, start)
-        ends.append((learner, _descended(learner, at)))
+        begin: Optimum | None = None
+        for stage, barrier in enumerate(study.smoothing):
+            smooth = replace(run, case=_smoothed(case, barrier))
+            resolver = resolver_of(smooth)
+            journal = Journal(work.folder / STEPS, run, resolver)
+            name = f"start-{start:02d}-{stage}"
+            learner = _Learner(
+                study, smooth.case, targets, resolver, journal, work.report, name, begin
+            )
+            learners.append(learner)
+            end = _descended(learner, at)
+            at, begin = end.x, learner.optimum(end.x)
+        ends.append((learner, end))
     learner, best = min(ends, key=lambda end: end[1].cost)
     slopes = best.jac
     covariance = np.linalg.inv(slopes.T @ slopes)
@@ -293,11 +319,21 @@ def learn(study: LearnStudy, run: Run, work: Work) -> LearnResult:
         left_out=left_out_errors(
             study.targets, recorded, targets, slopes, best.x, stride_at(optimum)
         ),
-        solves=sum(end.solves for end, _ in ends),
-        iterations=sum(end.iterations for end, _ in ends),
+        solves=sum(each.solves for each in learners),
+        iterations=sum(each.iterations for each in learners),
         seconds=time.perf_counter() - began,
         cpu_seconds=time.process_time() - used,
     )
+
+
+def _smoothed(case: Case, barrier: float) -> Case:
+    """Return a problem that is solved with what this barrier leaves of its inequalities.
+
+    A bound that becomes active bends the way of the optimum; with a barrier the way is smooth.
+    """
+    if not barrier:
+        return case
+    return case.with_values({"solver.ipopt": {**case.config.solver.ipopt, "mu_target": barrier}})
 
 
 def _starts(study: LearnStudy) -> list[np.ndarray]:

@@ -92,6 +92,20 @@ def targets_of(
     return tuple(t for t in (*curves, *numbers) if t is not None and t.weight > 0.0)
 
 
+def carried_weight(recorded: RecordedGait, without: Collection[str] = ()) -> float | None:
+    """Return the load of both feet over a stride [body weights], 1 for the right body.
+
+    None if the forces of a side were not measured.
+    """
+    means = []
+    for side in SIDES:
+        lines = cycles(recorded, FORCES[0], side, without).values()
+        if not lines:
+            return None
+        means.append(np.mean([line[:-1].mean() for each in lines for line in each]))
+    return float(sum(means)) / 100.0  # the curve is in % of body weight
+
+
 def cycles(
     recorded: RecordedGait, curve: CycleCurve, side: Side, without: Collection[str] = ()
 ) -> dict[str, list[np.ndarray]]:
