@@ -7,16 +7,7 @@ from collections.abc import Callable, Sequence
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from pathwalker_cli.evaluation.curves import (
-    ACTIVATIONS,
-    ANGLES,
-    FORCES,
-    MOMENTS,
-    CycleCurve,
-    Trace,
-    known_curves,
-    traces,
-)
+from pathwalker_cli.evaluation.curves import Trace, known_curves, traces
 from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_handles
 from pathwalker_cli.inverse.figures import joint_torque_figure, name_figure
 from pathwalker_cli.inverse.trials import Trial
@@ -24,6 +15,7 @@ from pathwalker_cli.patient.blocks import SpringSet
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.study_files import Spreads
+from pathwalker_cli.stride.figures.curves import ACTIVATIONS, ANGLES, FORCES, MOMENTS, CycleCurve
 from pathwalker_cli.stride.figures.inline import inline_svg
 from pathwalker_cli.stride.figures.style import STYLE, legend, new_figure
 from pathwalker_cli.studies.landscape.figures import Chosen, cost_figure

@@ -10,27 +10,24 @@ from typing import Final
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side, to_degrees
-from pathwalker_cli.evaluation.curves import ANGLES, FORCES, CycleCurve, Trace
+from pathwalker_cli.evaluation.curves import Trace
 from pathwalker_cli.evaluation.figures import ankle_figure, cycle_figure
 from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.reproduce.results import ProblemResult, Results
-from pathwalker_cli.stride.figures import orthosis_curves
-from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION
-from pathwalker_cli.stride.figures.save import save_formats
-from pathwalker_cli.stride.figures.style import (
-    NEUTRAL,
-    STYLE,
-    dress,
-    legend,
-    new_figure,
-    percent_axis,
-    zero_line,
+from pathwalker_cli.stride.figures import orthosis_curves, style
+from pathwalker_cli.stride.figures.curves import (
+    ANGLES,
+    CLINICAL_ANGLE,
+    EXTENSION,
+    FORCES,
+    CycleCurve,
 )
+from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import own_cycle
 
@@ -68,7 +65,7 @@ def save_paper_figures(results: Results, folder: Path) -> tuple[tuple[str, str],
     """
     saved = []
     for plan in _plans(results):
-        with mpl.rc_context(STYLE):
+        with mpl.rc_context(style.STYLE):
             figure = plan.make()
         save_formats(figure, folder, plan.name)
         saved.append((f"{plan.name}.png", plan.caption))
@@ -163,7 +160,7 @@ def curve_figure() -> Figure:
     Shares of the maximum isometric torque; flexion and dorsiflexion angles are positive, and so is
     the velocity of shortening.
     """
-    fig = new_figure(4.4)
+    fig = style.new_figure(4.4)
     grid = fig.subplots(3, 2, sharey="col")
     by_name = {each.name: each for each in generators()}
     angle, speed = np.linspace(-2.0, 2.0, 401), np.linspace(-_LARGEST_SPEED, _LARGEST_SPEED, 401)
@@ -178,11 +175,10 @@ def curve_figure() -> Figure:
             grid[row][1].plot(speed, share, **look)
         grid[row][0].set_xlim(*_ANGLES[joint])
         flexion = "dorsiflexion" if joint == "ankle" else "flexion"
-        title = joint.capitalize()
-        dress(grid[row][0], title, f"{flexion} [deg]", "torque-angle factor [1]")
-        dress(grid[row][1], title, "shortening velocity\n[rad/s]", "torque-velocity factor [1]")
-    handles = [Line2D([], [], label=name, **_LOOK[name]) for name in _DIRECTIONS]  # type: ignore[arg-type]
-    legend(fig, handles)
+        title, speeds = joint.capitalize(), "shortening velocity\n[rad/s]"
+        style.dress(grid[row][0], title, f"{flexion} [deg]", "torque-angle factor [1]")
+        style.dress(grid[row][1], title, speeds, "torque-velocity factor [1]")
+    style.legend(fig, [style.entry(name, **_LOOK[name]) for name in _DIRECTIONS])
     return fig
 
 
@@ -195,12 +191,12 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
         barefoot: The gait without orthoses.
         orthosis: The gait with orthoses.
     """
-    fig = new_figure(4.2)
+    fig = style.new_figure(4.2)
     grid = fig.subplots(3, 2, sharex=True, sharey="row")
     for column, side in enumerate(SIDES):
         for ax, joint in zip(grid[:, column], LEG_JOINTS, strict=True):
-            dress(ax, f"{side.capitalize()} {joint}", y="" if column else _TORQUE)
-            zero_line(ax)
+            style.dress(ax, f"{side.capitalize()} {joint}", y="" if column else _TORQUE)
+            style.zero_line(ax)
             for series, look in ((barefoot, _BAREFOOT), (orthosis, _ORTHOSIS)):
                 for direction in _DIRECTIONS:
                     name = f"{joint}_{direction}_{SUFFIX[side]}"
@@ -208,10 +204,9 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
                     _draw(ax, series, side, EXTENSION[joint] * torque, look)
             if joint == "ankle":
                 own = orthosis.orthosis_torque[:, SIDES.index(side)]
-                _draw(ax, orthosis, side, own, {"color": NEUTRAL, "linewidth": 0.7})
-            percent_axis(ax, *([] if joint == LEG_JOINTS[-1] else [""]))
-    thin = Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis")
-    legend(fig, [*_gait_handles(), thin])
+                _draw(ax, orthosis, side, own, {"color": style.NEUTRAL, "linewidth": 0.7})
+            style.percent_axis(ax, *([] if joint == LEG_JOINTS[-1] else [""]))
+    style.legend(fig, [*_gait_handles(), style.entry("thin: orthosis", linewidth=0.7)])
     return fig
 
 
@@ -222,23 +217,22 @@ def activation_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
         barefoot: The gait without orthoses.
         orthosis: The gait with orthoses.
     """
-    fig = new_figure(3.8)
+    fig = style.new_figure(3.8)
     grid = fig.subplots(3, 4, sharex=True, sharey=True)
     columns = [(side, direction) for side in SIDES for direction in _DIRECTIONS]
     for row, joint in zip(grid, LEG_JOINTS, strict=True):
         for ax, (side, direction) in zip(row, columns, strict=True):
             name = f"{joint}_{direction}_{SUFFIX[side]}"
             column = GENERATORS.index(name)
-            dress(ax, f"{side.capitalize()} {joint}\n{direction}",
+            style.dress(ax, f"{side.capitalize()} {joint}\n{direction}",
                   y="activation [1]" if (side, direction) == columns[0] else "")  # fmt: skip
             for series, look in ((barefoot, _BAREFOOT), (orthosis, _ORTHOSIS)):
                 thin = {**look, "linewidth": 0.6, "alpha": 0.7}
                 _draw(ax, series, side, series.excitation[:, column], thin)
                 _draw(ax, series, side, series.activation[:, column], look)
-            percent_axis(ax, "own cycle\n[%]" if joint == LEG_JOINTS[-1] else "")
+            style.percent_axis(ax, "own cycle\n[%]" if joint == LEG_JOINTS[-1] else "")
     grid[0][0].set_ylim(-0.03, 1.05)
-    thin_handle = Line2D([], [], color=NEUTRAL, linewidth=0.6, label="thin: excitation")
-    legend(fig, [*_gait_handles(), thin_handle])
+    style.legend(fig, [*_gait_handles(), style.entry("thin: excitation", linewidth=0.6)])
     return fig
 
 
@@ -250,9 +244,7 @@ def _draw(
     ax.plot(cycle.percent, values[cycle.index], **look)  # type: ignore[arg-type]
 
 
-def _gait_handles() -> Sequence[Line2D]:
+def _gait_handles() -> list[Artist]:
     """Return the legend entries of the two gaits."""
-    return [
-        Line2D([], [], label=label, **look)  # type: ignore[arg-type]
-        for label, look in (("MAPD-Barefoot", _BAREFOOT), ("MAPD-Orthosis", _ORTHOSIS))
-    ]
+    looks = {"MAPD-Barefoot": _BAREFOOT, "MAPD-Orthosis": _ORTHOSIS}
+    return [style.entry(label, **look) for label, look in looks.items()]

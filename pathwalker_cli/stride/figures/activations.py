@@ -6,22 +6,10 @@ from itertools import product
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side
+from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.curves import Reference
-from pathwalker_cli.stride.figures.style import (
-    LINE_COLOUR,
-    LINE_STYLE,
-    NEUTRAL,
-    dress,
-    events_handle,
-    legend,
-    new_figure,
-    percent_axis,
-    side_handles,
-    toe_off_line,
-)
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import own_cycle
 
@@ -35,7 +23,7 @@ def activations(series: GaitSeries, reference: Reference | None = None) -> Figur
         series: The stride.
         reference: Not used: activations are not recorded.
     """
-    fig = new_figure(4.6)
+    fig = style.new_figure(4.6)
     grid = fig.subplots(4, 4, sharex=True, sharey=True)
     columns = tuple(product(SIDES, _DIRECTIONS))
     for row, joint in zip(grid, LEG_JOINTS, strict=False):
@@ -50,12 +38,12 @@ def activations(series: GaitSeries, reference: Reference | None = None) -> Figur
     ):
         _draw(ax, series, name, "right", title)
     _label(grid)
-    legend(
+    style.legend(
         fig,
         [
-            *side_handles(),
-            Line2D([], [], color=NEUTRAL, linewidth=0.6, label="thin: excitation"),
-            events_handle(),
+            *style.side_handles(),
+            style.entry("thin: excitation", linewidth=0.6),
+            style.events_handle(),
         ],
     )
     return fig
@@ -64,16 +52,16 @@ def activations(series: GaitSeries, reference: Reference | None = None) -> Figur
 def _draw(ax: Axes, series: GaitSeries, name: str, side: Side, title: str) -> None:
     """Draw one generator."""
     cycle, column = own_cycle(series, side), GENERATORS.index(name)
-    colour = LINE_COLOUR[side]
-    dress(ax, title)
+    colour = style.LINE_COLOUR[side]
+    style.dress(ax, title)
     ax.plot(cycle.percent, series.excitation[cycle.index, column], color=colour, linewidth=0.6)
     ax.plot(
         cycle.percent,
         series.activation[cycle.index, column],
         color=colour,
-        linestyle=LINE_STYLE[side],
+        linestyle=style.LINE_STYLE[side],
     )
-    toe_off_line(ax, cycle)
+    style.toe_off_line(ax, cycle)
 
 
 def _label(grid: list[list[Axes]]) -> None:
@@ -82,9 +70,9 @@ def _label(grid: list[list[Axes]]) -> None:
         row[0].set_ylabel("activation [1]", labelpad=2.0)
     for top, ax in zip(grid[-2][2:], grid[-1][2:], strict=True):
         ax.axis("off")
-        percent_axis(top, "own cycle\n[%]")
+        style.percent_axis(top, "own cycle\n[%]")
         top.xaxis.set_tick_params(labelbottom=True)
     for ax in grid[-1][:2]:
-        percent_axis(ax, "right cycle\n[%]")
+        style.percent_axis(ax, "right cycle\n[%]")
     grid[0][0].set_ylim(-0.03, 1.05)
     grid[0][0].set_yticks([0.0, 0.5, 1.0])
