@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
 
 from pathwalker_cli.evaluation.curves import Trace, known_curves, traces
@@ -14,15 +15,16 @@ from pathwalker_cli.inverse.trials import Trial
 from pathwalker_cli.patient.blocks import SpringSet
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
-from pathwalker_cli.report.study_files import Spreads
 from pathwalker_cli.stride.figures.curves import ACTIVATIONS, ANGLES, FORCES, MOMENTS, CycleCurve
 from pathwalker_cli.stride.figures.inline import inline_svg
 from pathwalker_cli.stride.figures.style import STYLE, legend, new_figure
 from pathwalker_cli.studies.landscape.figures import Chosen, cost_figure
 from pathwalker_cli.studies.landscape.result import Landscape
+from pathwalker_cli.studies.measures import Ranges
 from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure
 from pathwalker_cli.studies.tradeoff.result import Tradeoff
 from pathwalker_cli.studies.uncertainty.figures import spread_figure
+from pathwalker_cli.studies.uncertainty.result import Spread
 
 
 def curve_section(runs: Sequence[ReportRun]) -> Section:
@@ -84,13 +86,12 @@ def tradeoff_drawing(tradeoff: Tradeoff) -> Drawing:
     return _drawn(lambda: tradeoff_figure(tradeoff), "tradeoff", title, "tall")
 
 
-def spread_drawing(spreads: Spreads) -> Drawing:
-    """Return where springs, cost and gait of all draws end up."""
+def spread_drawing(
+    values: Mapping[str, np.ndarray], ranges: Ranges, spreads: Sequence[Spread]
+) -> Drawing:
+    """Return where springs, cost and gait of all draws end up; see `spread_figure`."""
     title = "Springs of all draws [N m/rad], and deviation of cost and gait from the base [%]"
-    return _drawn(
-        lambda: spread_figure(spreads.values, spreads.ranges, spreads.spreads),
-        "uncertainty", title, "tall",
-    )  # fmt: skip
+    return _drawn(lambda: spread_figure(values, ranges, spreads), "uncertainty", title, "tall")
 
 
 def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
