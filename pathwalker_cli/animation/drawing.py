@@ -195,16 +195,10 @@ def _muscles(
             along = np.linspace(first, last, 11)
             near = np.stack([along, np.full(11, sign * _MUSCLE_GAP)], axis=1)
             far = np.stack([along, sign * (_MUSCLE_GAP + _MUSCLE_WIDTH * bulge)], axis=1)
+            lens = np.concatenate([near[[0, -1]], far[-2:0:-1]])
+            which = GENERATORS.index(f"{name}{suffix}")
             shapes.append(
-                Shape(
-                    "muscle",
-                    f"{start}{suffix}",
-                    f"{end}{suffix}",
-                    np.concatenate([near[[0, -1]], far[-2:0:-1]]),
-                    closed=True,
-                    side=side,
-                    generator=GENERATORS.index(f"{name}{suffix}"),
-                )
+                Shape("muscle", f"{start}{suffix}", f"{end}{suffix}", lens, True, side, which)
             )
     return tuple(shapes)
 
@@ -229,16 +223,8 @@ def _foot_shell() -> np.ndarray:
     """Return the shell under the foot with its cup behind the heel."""
     rear, front, thickness, height = _SOLE
     inner = rear + 0.1
-    return np.array(
-        [
-            [rear, 0.0],
-            [front, 0.0],
-            [front, thickness],
-            [inner, thickness],
-            [inner, height],
-            [rear, height],
-        ]
-    )
+    return np.array([[rear, 0.0], [front, 0.0], [front, thickness], [inner, thickness],
+                     [inner, height], [rear, height]])  # fmt: skip
 
 
 def _zigzag() -> np.ndarray:
@@ -252,13 +238,10 @@ def _zigzag() -> np.ndarray:
 def _spring_ends(points: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return where the springs hang on the shells, behind the ankles [m], shape (n, 2) each."""
     ends = {}
+    top, foot = np.array([[_SHELL[1], -_SHELL[2]]]), np.array([[_SOLE[0], _SOLE[3]]])
+    places = (("top", top, "knee", "ankle"), ("foot", foot, "heel", "toe"))
     for s in SUFFIX.values():
-        top = np.array([[_SHELL[1], -_SHELL[2]]])
-        foot = np.array([[_SOLE[0], _SOLE[3]]])
-        for name, corner, start, end in (
-            ("top", top, "knee", "ankle"),
-            ("foot", foot, "heel", "toe"),
-        ):
+        for name, corner, start, end in places:
             pairs = zip(points[f"{start}_{s}"], points[f"{end}_{s}"], strict=True)
             ends[f"spring_{name}_{s}"] = np.array([_placed(corner, a, b)[0] for a, b in pairs])
     return ends

@@ -234,14 +234,11 @@ def _panel(axes: Axes, each: Drawing, view: View) -> _Panel:
     now = [axes.text(x, 0.19 / high, "", fontsize=10, **head) for x in (0.02, 0.38, 0.52)]
     now[0].set_fontweight("bold")
     weight = force_scale(frames) * frames.weight
-    bar: dict[str, Any] = {
-        "transform": axes.get_yaxis_transform(),
-        "color": FORCE_COLOUR,
-        "linewidth": 1.5,
-    }
-    axes.plot([0.03, 0.03], [view.top - 0.05 - weight, view.top - 0.05], marker="_", **bar)
-    axes.text(0.05, view.top - 0.05, f"force of 1 body weight,\n{frames.weight:.0f} N",
-              transform=axes.get_yaxis_transform(), va="top", fontsize=8)  # fmt: skip
+    place, top = axes.get_yaxis_transform(), view.top - 0.05
+    bar: dict[str, Any] = {"color": FORCE_COLOUR, "linewidth": 1.5, "marker": "_"}
+    axes.plot([0.03, 0.03], [top - weight, top], transform=place, **bar)
+    told = f"force of 1 body weight,\n{frames.weight:.0f} N"
+    axes.text(0.05, top, told, transform=place, va="top", fontsize=8)
     looks = [(shape_look(shape), shape.closed) for shape in each.shapes]
     arrows = [arrow_look(side) for side in SIDES]
     return _Panel(
@@ -282,21 +279,13 @@ def _legend(figure: Figure, drawings: Sequence[Drawing], width: float, height: f
         Patch(facecolor="#ffffff", edgecolor=FORCE_COLOUR, label="left"),
     ]
     if any(each.frames.condition == "orthosis" for each in drawings):
-        handles.append(
-            Patch(facecolor=(SHELL_COLOUR, 0.45), edgecolor=SPRING_COLOUR, label="orthosis")
-        )
-    figure.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 0.4 / height),
-        ncols=len(handles),
-        frameon=False,
-        columnspacing=1.0,
-        handlelength=2.2,
-    )
+        shell = (SHELL_COLOUR, 0.45)
+        handles.append(Patch(facecolor=shell, edgecolor=SPRING_COLOUR, label="orthosis"))
+    figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 0.4 / height),
+                  ncols=len(handles), frameon=False, columnspacing=1.0,
+                  handlelength=2.2)  # fmt: skip
     scale = figure.add_axes((1.0 - 1.25 / width, 0.62 / height, 1.0 / width, 0.1 / height))
-    figure.colorbar(
-        ScalarMappable(cmap=_COLOURS), cax=scale, orientation="horizontal", ticks=[0, 1]
-    )
+    colours = ScalarMappable(cmap=_COLOURS)
+    figure.colorbar(colours, cax=scale, orientation="horizontal", ticks=[0, 1])
     scale.set_title("muscle activation", fontsize=7, pad=2)
     scale.tick_params(length=0, labelsize=7, pad=1)

@@ -95,19 +95,25 @@ def summary_rows(
     return rows
 
 
-def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = ()) -> str:
-    """Return labels and values as plain text, then what else to know, one line each."""
-    width = max(len(label) for label, _ in rows)
+def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = (), width: int = 0) -> str:
+    """Return labels and values as plain text, then what else to know, one line each.
+
+    Args:
+        rows: Label and value.
+        notes: What else to know.
+        width: Least width of the labels.
+    """
+    width = max([width, *(len(label) for label, _ in rows)])
     lines = [f"{label:<{width}}  {value}" for label, value in rows]
     return "\n".join([*lines, *(f"note: {note}" for note in notes)])
 
 
 def summary_renderable(
-    rows: Sequence[tuple[str, str]], notes: Iterable[str] = ()
+    rows: Sequence[tuple[str, str]], notes: Iterable[str] = (), width: int = 0
 ) -> RenderableType:
-    """Return the same for a `rich` console, which drops the colours off a terminal."""
+    """Return the same for a `rich` console, on which long texts stay in their column."""
     table = Table.grid(padding=(0, 2))
-    table.add_column(style="dim", no_wrap=True)
+    table.add_column(style="dim", no_wrap=True, min_width=width)
     table.add_column()
     for label, value in rows:
         table.add_row(label, Text(value))
@@ -206,13 +212,8 @@ def optimum_lines(optima: Sequence[LocalOptimum]) -> list[tuple[str, str]]:
     if len(costs) > 1:
         near = sum(cost <= costs[0] + 0.05 * abs(costs[0]) for cost in costs)
         spread = (costs[-1] - costs[0]) / abs(costs[0])
-        lines.append(
-            (
-                "local optima",
-                f"{len(costs)} of {len(optima)} starts converged, {near} within 5 % of the best; "
-                f"the worst is {100 * spread:.1f} % above",
-            )
-        )
+        text = f"{len(costs)} of {len(optima)} starts converged, {near} within 5 % of the best; "
+        lines.append(("local optima", f"{text}the worst is {100 * spread:.1f} % above"))
     return lines
 
 
@@ -336,15 +337,12 @@ def orthosis_rows(orthosis: OrthosisData) -> list[tuple[str, str]]:
     }
     if len(set(stops.values())) == 1:
         stops = {" and ".join(SIDES): stops[SIDES[0]]}
-    rows = [
-        (
-            "orthosis",
-            f"per leg {mass.shank:g} kg on the shank, {mass.foot:g} kg on the foot; right and "
-            f"left: neutral angle {angle_words(orthosis.neutral_angle)}, play {play:.1f} deg "
-            f"around it, preload {orthosis.preload_torque:g} N m either way",
-        ),
-        *(("stops", f"{side}: {text}") for side, text in stops.items()),
-    ]
+    worn = (
+        f"per leg {mass.shank:g} kg on the shank, {mass.foot:g} kg on the foot; right and "
+        f"left: neutral angle {angle_words(orthosis.neutral_angle)}, play {play:.1f} deg "
+        f"around it, preload {orthosis.preload_torque:g} N m either way"
+    )
+    rows = [("orthosis", worn), *(("stops", f"{side}: {text}") for side, text in stops.items())]
     span = orthosis.stiffness_range
     ranges = [f"{k} {_range(getattr(span, name))}" for name, k in _KINDS.items()]
     rows.append(("springs", f"{', '.join(ranges)} N m/rad ({span.source})"))

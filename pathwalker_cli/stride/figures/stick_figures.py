@@ -83,8 +83,8 @@ def _draw_body(ax: Axes, points: dict[str, np.ndarray]) -> None:
     trunk = {"color": style.BODY_COLOUR["right"], "linewidth": 1.6, "zorder": 4}
     _draw_chain(ax, points, ("lumbar", "neck"), trunk)
     radius = float(np.linalg.norm(points["head"] - points["neck"]))
-    round_ = {"fill": False, "color": style.BODY_COLOUR["right"], "linewidth": 0.9}
-    ax.add_patch(Circle(tuple(points["head"]), radius, **round_))
+    outline = {"fill": False, "color": style.BODY_COLOUR["right"], "linewidth": 0.9}
+    ax.add_patch(Circle(tuple(points["head"]), radius, **outline))
 
 
 def _draw_chain(
