@@ -111,11 +111,7 @@ def write_film(path: Path, runs: Sequence[GaitFrames], strides: int, rate: float
 
 @contextmanager
 def _writer(kind: str, rate: float) -> Iterator[AbstractMovieWriter]:
-    """Yield what puts frames together.
-
-    Raises:
-        DataError: If there is no program that makes MP4, or it fails.
-    """
+    """Yield what puts frames together."""
     if kind == ".gif":
         # It cuts 1000 / rate to whole milliseconds, where 29.999 would become 20.
         yield PillowWriter(fps=rate * (1.0 - 1e-9))  # type: ignore[arg-type]
@@ -132,11 +128,7 @@ def _writer(kind: str, rate: float) -> Iterator[AbstractMovieWriter]:
 
 
 def _ffmpeg() -> str:
-    """Return the ffmpeg of the system, or else the one that pip installed.
-
-    Raises:
-        DataError: If there is none.
-    """
+    """Return the ffmpeg of the system, or else the one that pip installed."""
     program = shutil.which("ffmpeg")
     if program is not None:
         return program

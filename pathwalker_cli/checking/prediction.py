@@ -130,10 +130,6 @@ def check_prediction(path: str, changes: Changes = (), problem: str = "") -> Che
 def ready_solver(case: Case, where: str) -> GaitSolver:
     """Return the solver of a case, with everything checked that needs no solve.
 
-    Args:
-        case: The case.
-        where: Its file, for messages.
-
     Raises:
         InputError: The first thing that is wrong.
     """

@@ -15,13 +15,7 @@ from pathwalker_cli.studies.registry import STUDIES
 
 
 def check_study(command: str, path: str, changes: Changes = ()) -> Checked:
-    """Return what the command of a study around an optimum would do.
-
-    Args:
-        command: The command.
-        path: Config of the study.
-        changes: Overrides "dotted.key=value".
-    """
+    """Return what the command of a study around an optimum would do."""
     entry = STUDIES[command]
     kind = entry.load()
     study = load_study(path, kind.model, changes)

@@ -180,15 +180,7 @@ def _study(
     out: Path,
     quiet: bool,
 ) -> None:
-    """Evaluate the trials of a config, write all files or none, and report.
-
-    Args:
-        config: The config.
-        evaluate: Returns its trials; names the one at work.
-        write: Writes the files into a folder.
-        out: Where the files shall be.
-        quiet: Whether to print warnings only.
-    """
+    """Evaluate the trials of a config, write all files or none, and report."""
     from rich.console import Console
 
     from pathwalker_cli.inverse.text import stance_notes, trial_warnings, trials_renderable

@@ -151,11 +151,6 @@ def draw_ankle(ax: Axes, shown: Sequence[Trace], side: Side) -> None:
 
     Dorsiflexion is positive, and so is the plantarflexing torque of muscles and orthosis.
 
-    Args:
-        ax: The panel.
-        shown: The gaits.
-        side: The side.
-
     Raises:
         NotKnownError: If the torques of a gait are not known.
     """

@@ -162,11 +162,7 @@ def studies_near(
 
 
 def _study(folder: Path, kind: Kind) -> Study:
-    """Read the summary of a study.
-
-    Raises:
-        DataError: If it cannot be read, or is not what the command writes.
-    """
+    """Read the summary of a study."""
     path = folder / STUDIES[kind]
     content = read_json(path, mend="make the study again")
     model = SUMMARIES.get(kind, Summary)

@@ -20,12 +20,7 @@ from pathwalker_cli.studies.verdict import snapped_warning
 
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
-    """Return the page about the runs of one patient.
-
-    Args:
-        runs: The runs, barefoot ones first.
-        studies: Studies around one of them.
-    """
+    """Return the page about runs of one patient, barefoot ones first, with studies around them."""
     patient, changes = runs[0].patient, changes_of(runs)
     with_orthoses = [run for run in runs if run.worn]
     sections = [spring_section(run) for run in with_orthoses]

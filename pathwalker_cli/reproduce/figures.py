@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -19,6 +18,7 @@ from pathwalker_cli.evaluation.curves import Trace
 from pathwalker_cli.evaluation.figures import ankle_figure, cycle_figure
 from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.reproduce.results import ProblemResult, Results
+from pathwalker_cli.reproduce.words import SUBJECTS
 from pathwalker_cli.stride.figures import orthosis_curves, style
 from pathwalker_cli.stride.figures.curves import (
     ANGLES,
@@ -31,26 +31,14 @@ from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import own_cycle
 
-_NAMES: Final = {
-    "ls-barefoot": "LS-Barefoot",
-    "mapd-barefoot": "MAPD-Barefoot",
-    "mapd-orthosis": "MAPD-Orthosis",
-    "mapd-ws-orthosis": "MAPD-WS-Orthosis",
-    "mapd-healthy": "MAPD-Healthy",
-}
 _ARTICLE: Final = ("mapd-orthosis", "mapd-barefoot", "ls-barefoot")
 """Problems that figures 3 and 4 of the article show."""
 _BEYOND: Final = ("mapd-ws-orthosis", "mapd-healthy")
 """Problems whose curves the article leaves to its supplement or out."""
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """One figure to be drawn."""
-
-    name: str
-    caption: str
-    make: Callable[[], Figure]
+_Plan = tuple[str, str, Callable[[], Figure]]
+"""Name and caption of a figure, and what draws it."""
 
 
 def save_paper_figures(results: Results, folder: Path) -> tuple[tuple[str, str], ...]:
@@ -64,53 +52,44 @@ def save_paper_figures(results: Results, folder: Path) -> tuple[tuple[str, str],
         PNG file name and caption of every figure.
     """
     saved = []
-    for plan in _plans(results):
+    for name, caption, make in _plans(results):
         with mpl.rc_context(style.STYLE):
-            figure = plan.make()
-        save_formats(figure, folder, plan.name)
-        saved.append((f"{plan.name}.png", plan.caption))
+            figure = make()
+        save_formats(figure, folder, name)
+        saved.append((f"{name}.png", caption))
     return tuple(saved)
 
 
 def _plans(results: Results) -> Iterator[_Plan]:
     """Yield what can be drawn, in the order of the article."""
     solved = {name: each for name, each in results.problems.items() if each.converged}
-    yield _Plan(
-        "figure-1",
+    caption = (
         "Figure 1: active torque over angle and torque over angular velocity of the muscle torque "
-        "generators, as shares of the maximum isometric torque.",
-        curve_figure,
+        "generators, as shares of the maximum isometric torque."
     )
+    yield "figure-1", caption, curve_figure
     if "mapd-orthosis" in solved:
-        springs = _series(solved["mapd-orthosis"])
-        yield _Plan(
-            "figure-2",
-            "Figure 2: torque over angle of the orthoses, with the springs of MAPD-Orthosis.",
-            lambda: orthosis_curves(springs),
-        )
+        caption = "Figure 2: torque over angle of the orthoses, with the springs of MAPD-Orthosis."
+        yield "figure-2", caption, partial(orthosis_curves, _series(solved["mapd-orthosis"]))
     yield from _kinds(solved, "figure-3", "joint angles", ANGLES)
     yield from _kinds(solved, "figure-4", "ground reaction forces", FORCES)
     if {"mapd-barefoot", "mapd-orthosis"} <= solved.keys():
         gaits = tuple(_series(solved[name]) for name in ("mapd-barefoot", "mapd-orthosis"))
-        yield _Plan(
-            "figure-5",
-            "Figure 5: torques of the muscles, MAPD-Barefoot and MAPD-Orthosis, and the torque "
-            "of the orthoses at the ankles. Extension and plantarflexion are positive.",
-            lambda: muscle_torque_figure(*gaits),
+        caption = (
+            "Figure 5: torques of the muscles, MAPD-Barefoot and MAPD-Orthosis, and the torque of "
+            "the orthoses at the ankles. Extension and plantarflexion are positive."
         )
-        yield _Plan(
-            "figure-6",
-            "Figure 6: muscle activations and neural excitations, MAPD-Barefoot and MAPD-Orthosis.",
-            lambda: activation_figure(*gaits),
+        yield "figure-5", caption, partial(muscle_torque_figure, *gaits)
+        caption = (
+            "Figure 6: muscle activations and neural excitations, MAPD-Barefoot and MAPD-Orthosis."
         )
+        yield "figure-6", caption, partial(activation_figure, *gaits)
     if "mapd-orthosis" in solved:
-        trace = _trace(solved["mapd-orthosis"])
-        yield _Plan(
-            "figure-7",
+        caption = (
             "Figure 7: net ankle torque over ankle angle in stance, MAPD-Orthosis and recordings "
-            "with orthoses.",
-            lambda: ankle_figure(trace),
+            "with orthoses."
         )
+        yield "figure-7", caption, partial(ankle_figure, _trace(solved["mapd-orthosis"]))
 
 
 def _kinds(
@@ -123,8 +102,8 @@ def _kinds(
             trace = _trace(solved[problem])
             beyond = " (not in the article's main text)" if problem in _BEYOND else ""
             band = "" if trace.recorded is None else ", over the recorded range"
-            caption = f"{number}, {_NAMES[problem]}{beyond}: {what}{band}."
-            yield _Plan(f"{name}-{problem}", caption, partial(cycle_figure, trace, curves))
+            caption = f"{number}, {SUBJECTS[problem]}{beyond}: {what}{band}."
+            yield f"{name}-{problem}", caption, partial(cycle_figure, trace, curves)
 
 
 def _series(result: ProblemResult) -> GaitSeries:
@@ -186,10 +165,6 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
     """Return the muscle torques of both gaits at hip, knee and ankle of each side.
 
     Extension and plantarflexion are positive; the torque of the orthoses is drawn thin.
-
-    Args:
-        barefoot: The gait without orthoses.
-        orthosis: The gait with orthoses.
     """
     fig = style.new_figure(4.2)
     grid = fig.subplots(3, 2, sharex=True, sharey="row")
@@ -211,12 +186,7 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
 
 
 def activation_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
-    """Return activations and excitations of both gaits for the muscles of each leg.
-
-    Args:
-        barefoot: The gait without orthoses.
-        orthosis: The gait with orthoses.
-    """
+    """Return activations and excitations of both gaits for the muscles of each leg."""
     fig = style.new_figure(3.8)
     grid = fig.subplots(3, 4, sharex=True, sharey=True)
     columns = [(side, direction) for side in SIDES for direction in _DIRECTIONS]

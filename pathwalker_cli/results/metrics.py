@@ -165,13 +165,7 @@ def metrics_hash(metrics: Mapping[str, Any]) -> str:
 def run_metrics(
     solution: GaitSolution, inputs: RunInputs, more: Mapping[str, Any] | None = None
 ) -> RunMetrics:
-    """Return all metrics of a solve.
-
-    Args:
-        solution: How it ended.
-        inputs: What it was made from.
-        more: Further entries, plain values.
-    """
+    """Return all metrics of a solve."""
     began = time.perf_counter()
     proof = _proof(solution)  # runs the second engine
     verify = solution.seconds["verify"] + time.perf_counter() - began

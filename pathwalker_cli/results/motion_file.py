@@ -124,11 +124,7 @@ def read_arrays(path: Path) -> Mapping[str, np.ndarray]:
 
 
 def _floats(values: np.ndarray) -> np.ndarray:
-    """Return an array of floating point numbers.
-
-    Raises:
-        TypeError: If it holds something else.
-    """
+    """Return an array of floating point numbers."""
     if values.dtype.kind != "f":
         raise TypeError(f"an array of type {values.dtype}")
     return values

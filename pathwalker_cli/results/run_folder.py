@@ -94,12 +94,7 @@ class Run:
 
 
 def default_folder(config: StudyConfig, patient: str) -> Path:
-    """Return where a run is written if nobody says where; a quick check stands apart.
-
-    Args:
-        config: The config.
-        patient: Id of the patient.
-    """
+    """Return where a run is written if nobody says where; a quick check stands apart."""
     return Path("runs") / f"{config.problem}-{patient}{'-smoke' if config.smoke else ''}"
 
 
@@ -350,10 +345,6 @@ def _read_metrics(folder: Path) -> dict[str, Any]:
 
 def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
     """Return the run that a solve shall begin with.
-
-    Args:
-        folder: Its folder.
-        config: What is to be solved.
 
     Raises:
         DataError: If it cannot be used, did not converge or is about another condition.

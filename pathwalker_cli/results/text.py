@@ -96,13 +96,7 @@ def summary_rows(
 
 
 def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = (), width: int = 0) -> str:
-    """Return labels and values as plain text, then what else to know, one line each.
-
-    Args:
-        rows: Label and value.
-        notes: What else to know.
-        width: Least width of the labels.
-    """
+    """Return labels and values as plain text, then what else to know, one line each."""
     width = max([width, *(len(label) for label, _ in rows)])
     lines = [f"{label:<{width}}  {value}" for label, value in rows]
     return "\n".join([*lines, *(f"note: {note}" for note in notes)])
@@ -218,11 +212,7 @@ def optimum_lines(optima: Sequence[LocalOptimum]) -> list[tuple[str, str]]:
 
 
 def source_lines(sources: Mapping[str, str]) -> list[str]:
-    """Return where the bounds come from, in short: equal reasons are said once.
-
-    Args:
-        sources: `GaitBounds.sources`.
-    """
+    """Return where the bounds come from, in short: equal reasons are said once."""
     groups: dict[tuple[str, str], list[str]] = {}
     for name, text in sources.items():
         if name in _ANGLES:
@@ -243,12 +233,7 @@ def source_lines(sources: Mapping[str, str]) -> list[str]:
 
 
 def failure_text(solution: GaitSolution, folder: str) -> str:
-    """Return one sentence about a solve that did not converge.
-
-    Args:
-        solution: How it ended.
-        folder: Where its files are.
-    """
+    """Return one sentence about a solve that did not converge."""
     why = solution.shortfall
     parts = [] if why is None else [shortfall_text(why)]
     if why is None or not why.too_weak:

@@ -258,12 +258,6 @@ def stride_of(
 ) -> Stride:
     """Return the stride that the solver found.
 
-    Args:
-        series: Its time series.
-        name: What to call it.
-        problem: The problem that it solves.
-        notes: What to know about it.
-
     Raises:
         DataError: If the motion is not one stride in the eight phases.
     """

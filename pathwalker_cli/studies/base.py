@@ -192,12 +192,7 @@ def planned(
 
 
 def _given(study: NeighbourStudy, folder: Path) -> Run:
-    """Return the run that was named.
-
-    Raises:
-        ConfigError: If the study overrides values of the base.
-        DataError: If the run cannot be used.
-    """
+    """Return the run that was named."""
     if study.set:
         raise ConfigError(
             "overrides values of the base, but --run brings a config of its own",

@@ -85,10 +85,6 @@ def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figu
 
     Dorsiflexion is positive, and so is the plantarflexing torque of muscles and orthosis.  The
     slope is that of `ankle_profile.ankle_torque_slope`, over the thick part of the path.
-
-    Args:
-        series: The stride.
-        reference: Not used.
     """
     fig = style.new_figure(2.4)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)

@@ -35,10 +35,6 @@ def joint_angles(series: GaitSeries, reference: Reference | None = None) -> Figu
     """Return pelvis, hip, knee, ankle and lumbar angles over the gait cycle of each side.
 
     Flexion, dorsiflexion and forward lean are positive, as gait laboratories plot them.
-
-    Args:
-        series: The stride.
-        reference: Recorded bands to draw behind.
     """
     bands, fig = reference.angles if reference else {}, style.new_figure(3.9)
     panels = fig.subplots(3, 2).ravel()
@@ -52,10 +48,6 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
 
     Internal moments, of muscles and orthosis on the joint, over mass with the orthosis; extension
     and plantarflexion are positive.  Thin lines at the ankle are the part of the orthosis.
-
-    Args:
-        series: The stride.
-        reference: Recorded bands to draw behind.
     """
     bands, fig = reference.moments if reference else {}, style.new_figure(2.9)
     panels = fig.subplots(2, 2).ravel()
@@ -70,12 +62,7 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
 
 
 def ground_forces(series: GaitSeries, reference: Reference | None = None) -> Figure:
-    """Return vertical and fore-aft ground reaction forces on each foot over its gait cycle.
-
-    Args:
-        series: The stride.
-        reference: Recorded bands to draw behind.
-    """
+    """Return vertical and fore-aft ground reaction forces on each foot over its gait cycle."""
     bands, fig = reference.forces if reference else {}, style.new_figure(2.1)
     panels = fig.subplots(1, 2)
     handles = _draw(

@@ -49,13 +49,7 @@ def figure_names(series: GaitSeries) -> tuple[str, ...]:
 
 
 def make_figure(name: str, series: GaitSeries, reference: Reference | None = None) -> Figure:
-    """Return a figure in the common style.
-
-    Args:
-        name: A key of `FIGURES`.
-        series: The stride.
-        reference: Recorded bands to draw behind.
-    """
+    """Return a figure in the common style."""
     with mpl.rc_context(STYLE):
         return FIGURES[name](series, reference)
 
@@ -100,12 +94,7 @@ def save_formats(
 
 
 def save_figure(figure: Figure, path: str | Path) -> None:
-    """Save a figure in one stroke; its layout is settled by the first format.
-
-    Args:
-        figure: A figure made under `style.STYLE`.
-        path: The file, ".png" or ".svg".
-    """
+    """Save a figure in one stroke; its layout is settled by the first format."""
     path = Path(path)
     extension = path.suffix.removeprefix(".")
     with mpl.rc_context(STYLE), atomic_path(path) as temporary:

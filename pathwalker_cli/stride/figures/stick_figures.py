@@ -26,12 +26,7 @@ _LEG_LOOK: Final[dict[Side, dict[str, Any]]] = {
 
 
 def stick_figures(series: GaitSeries, reference: Reference | None = None) -> Figure:
-    """Return ten stick figures over the right gait cycle with their ground reaction forces.
-
-    Args:
-        series: The stride.
-        reference: Not used.
-    """
+    """Return ten stick figures over the right gait cycle with their ground reaction forces."""
     fig = style.new_figure(3.5)
     for ax, row in zip(fig.subplots(2, 1), _ROWS, strict=True):
         _draw_row(ax, series, row)

@@ -137,11 +137,7 @@ def _variants(study: BatchStudy, problem: str, base: Case, where: str) -> Iterat
 def _check_new(
     case: BatchCase, cases: Mapping[str, BatchCase], known: dict[str, str], where: str
 ) -> None:
-    """Refuse a case whose name or content is there already.
-
-    Raises:
-        ConfigError: If there is such a case.
-    """
+    """Refuse a case whose name or content is there already."""
     content = case.study.config.model_dump_json()
     if case.name in cases or content in known:
         other = known.get(content, case.name)
@@ -263,11 +259,6 @@ def listed_problems(entries: tuple[str, ...], folder: Path, where: str) -> dict[
 def check_case(name: str, case: Case, where: str) -> None:
     """Refuse a case that could not even begin.
 
-    Args:
-        name: Its name, for the message.
-        case: Config and patient.
-        where: The study, for the message.
-
     Raises:
         InputError: If the patient lacks what the problem needs, or a value does not fit.
     """
@@ -297,11 +288,7 @@ def check_patient(case: Case) -> None:
 
 
 def _check_starts(config: StudyConfig) -> None:
-    """Refuse a config for several processes.
-
-    Raises:
-        ConfigError: If so.
-    """
+    """Refuse a config for several processes."""
     if config.starts > 1:
         raise ConfigError(
             f"is {config.starts}",
@@ -312,11 +299,7 @@ def _check_starts(config: StudyConfig) -> None:
 
 
 def _check_start(config: StudyConfig, walker: Walker) -> None:
-    """Refuse half a cycle of unequal sides, and a recorded start without a recording.
-
-    Raises:
-        InputError: If so.
-    """
+    """Refuse half a cycle of unequal sides, and a recorded start without a recording."""
     if config.half_cycle:
         require_symmetry(walker)
     if config.start.gait == "recorded":

@@ -157,11 +157,7 @@ def _client(address: str) -> Any:
 
 
 def _require(library: str) -> None:
-    """Refuse to go on without a library of the extra.
-
-    Raises:
-        BackendError: If it is not installed.
-    """
+    """Refuse to go on without a library of the extra."""
     from importlib.util import find_spec
 
     if find_spec(library) is None:

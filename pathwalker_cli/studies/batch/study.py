@@ -51,13 +51,6 @@ def run_batch(
 ) -> Report:
     """Solve all cases that are not solved yet, each into its run folder, and keep the table.
 
-    Args:
-        cases: The cases in order.
-        folder: Folder of the study.
-        pool: Who solves them.
-        watch: Hears of every case.
-        work: Solves one case.
-
     Raises:
         DataError: If the folder holds something else, or another process is at work there.
         NotConvergedError: If the user stopped it.

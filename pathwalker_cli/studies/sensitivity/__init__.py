@@ -72,12 +72,7 @@ class SensitivityStudy(NeighbourStudy):
 
 
 def default_places(patient: Patient, with_orthosis: bool) -> tuple[str, ...]:
-    """Return the places in a patient's file that are asked about.
-
-    Args:
-        patient: The patient.
-        with_orthosis: Whether the orthosis is worn.
-    """
+    """Return the places in a patient's file that are asked about."""
     places = []
     if with_orthosis:
         places += [f"orthosis.{name}" for name in _ORTHOSIS]

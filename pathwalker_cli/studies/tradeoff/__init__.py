@@ -64,12 +64,7 @@ def plan(study: TradeoffStudy, solver: GaitSolver) -> Plan:
 
 
 def chain(weights: tuple[float, ...], base: float) -> Graph:
-    """Return the points of a trade-off: one behind the other by weight, the base among them.
-
-    Args:
-        weights: Weights of walking speed.
-        base: That of the base.
-    """
+    """Return the points of a trade-off: one behind the other by weight, the base among them."""
     named: dict[str, Values] = {ROOT: (base,), **{f"w{w:g}": (w,) for w in weights}}
     order = sorted(named, key=lambda name: named[name])
     return Graph(named, tuple(pairwise(order)), ROOT)

@@ -61,11 +61,7 @@ def _draw_front(ax: Axes, tradeoff: Tradeoff) -> None:
 
 
 def labels(points: Sequence[FrontPoint]) -> list[tuple[FrontPoint, str]]:
-    """Return where to write which weights: points in one place share a label.
-
-    Args:
-        points: The points, by rising weight.
-    """
+    """Return where to write which weights, which rise: points in one place share a label."""
     groups: list[list[FrontPoint]] = []
     for point in points:
         last = groups[-1][0] if groups else None

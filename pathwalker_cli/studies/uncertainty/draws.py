@@ -120,10 +120,7 @@ class Draws:
 def draw(inputs: tuple[Input, ...], count: int, seed: int) -> Draws:
     """Return draws by a Latin hypercube: every input goes evenly through its distribution.
 
-    Args:
-        inputs: What is drawn.
-        count: Number of draws.
-        seed: Equal seeds give equal draws.
+    Equal seeds give equal draws.
     """
     cube = qmc.LatinHypercube(len(inputs), rng=np.random.default_rng(seed)).random(count)
     columns = [i.distribution.amounts(cube[:, j]) for j, i in enumerate(inputs)]

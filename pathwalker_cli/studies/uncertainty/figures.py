@@ -79,22 +79,14 @@ def spread_figure(
 
 
 def _draw(ax: Axes, y: int, values: np.ndarray, spread: Spread, unit: float) -> None:
-    """Draw the draws of one measure, their median and range, and the base.
-
-    Args:
-        ax: Where.
-        y: Its row.
-        values: What is drawn, in the unit of the axis.
-        spread: The measure.
-        unit: 100 for deviations in %, where the base is zero; 1 for the values themselves.
-    """
+    """Draw the draws of one measure, their median and range, and the base."""
     colour, marker = style.side_look(spread.measure.key)
     heights = y + np.random.default_rng(_SEED).uniform(-_STRIP, _STRIP, len(values))
     ax.plot(values, heights, marker, color=colour, markersize=2.6, alpha=0.45, mew=0.0)
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
     ax.plot([low, high], [y, y], color=colour, linewidth=1.6)
     ax.plot(middle, y, marker, color=colour, markersize=5.5, mec="white", mew=0.6)
-    base = spread.base if unit == 1.0 else 0.0
+    base = spread.base if unit == 1.0 else 0.0  # 100: deviations in %, around the base
     ax.plot(base, y, "|", color="black", markersize=13.0, mew=1.0)
 
 
