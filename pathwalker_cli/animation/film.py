@@ -193,15 +193,12 @@ def _figure(drawings: Sequence[Drawing], slow: float) -> tuple[Figure, list[_Pan
         place = (edge / width, _FOOTER / height, _PANEL / width, _PANEL * shape / height)
         panels.append(_panel(figure.add_axes(place), each, view))
     _legend(figure, drawings, width, height)
-    lines = [pace([each.frames for each in drawings]), _slowed(slow), CAVEAT]
+    lines = [pace([each.frames for each in drawings]), CAVEAT]
+    if abs(slow - 1.0) >= 0.02:
+        lines.insert(1, f"The film takes {slow:.2f} times as long as the walk.")
     caption = fill(" ".join(line for line in lines if line), round(15 * width))
     figure.text(0.12 / width, 0.06 / height, caption, va="bottom", parse_math=False, fontsize=7)
     return figure, panels
-
-
-def _slowed(slow: float) -> str:
-    """Return how much longer the film takes than the walk; nothing if it takes as long."""
-    return "" if abs(slow - 1.0) < 0.02 else f"The film takes {slow:.2f} times as long as the walk."
 
 
 def _panel(axes: Axes, each: Drawing, view: View) -> _Panel:

@@ -106,12 +106,7 @@ def spread_text(values: Spread | None, measure: Measure) -> str:
 def evaluation_content(
     evaluations: Sequence[Evaluation], changes: Sequence[Change] = ()
 ) -> dict[str, Any]:
-    """Return everything that was evaluated, ready for JSON.
-
-    Args:
-        evaluations: One or more gaits beside the recordings.
-        changes: Changes from barefoot to orthosis.
-    """
+    """Return everything that was evaluated, ready for JSON."""
     return {
         "runs": [_run(each) for each in evaluations],
         "changes": {change.measure.key: _change(change) for change in changes},

@@ -39,10 +39,6 @@ _LEAST: Final = 1e-3
 def study_section(study: Study, run: ReportRun) -> Section:
     """Return table and figure of a study.
 
-    Args:
-        study: The study.
-        run: The run that it stands on.
-
     Raises:
         DataError: If its files are not those that the command wrote.
     """

@@ -225,7 +225,12 @@ def _why(number: PaperNumber, results: Results) -> str:
     reason, result = _reason(number, _REASONS), results.problems.get(number.subject)
     if result is None or result.evaluation is None:
         return reason
-    parts = [_resting(number, result), reason]
+    parts = [
+        f"ours rests on its {bound.side} bound, {bound.value:.4g} {number.unit}"
+        for bound in result.bounds
+        if bound.name == number.quantity
+    ][:1]
+    parts.append(reason)
     if number.quantity.startswith("rms_one_trial_"):  # as the article words it
         key = number.quantity.replace("one_trial", "mean_cycle")
         parts += [
@@ -234,11 +239,3 @@ def _why(number: PaperNumber, results: Results) -> str:
             if row.measure.key == key and row.value is not None
         ]
     return "; ".join(part for part in parts if part)
-
-
-def _resting(number: PaperNumber, result: ProblemResult) -> str:
-    """Return that a quantity sits at its bound in this run, "" if it does not."""
-    for bound in result.bounds:
-        if bound.name == number.quantity:
-            return f"ours rests on its {bound.side} bound, {bound.value:.4g} {number.unit}"
-    return ""

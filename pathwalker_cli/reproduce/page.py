@@ -78,7 +78,8 @@ def page_text(
         lines += _plainly(plain_rows) if plain_rows else []
     lines += ["", "### Table 5: springs that are 5 % softer", "", *_table_5()]
     lines += ["", "### Changes that the article states", "", *_change_lines(results.changes)]
-    lines += ["", "## Figures", "", *_figure_lines(figures)]
+    pictures = [f"![{caption}]({file})\n\n*{caption}*\n" for file, caption in figures]
+    lines += ["", "## Figures", "", *(pictures or ["None: no problem converged."])]
     return "\n".join(lines) + "\n"
 
 
@@ -169,14 +170,6 @@ def _change_lines(changes: Sequence[Change]) -> Iterator[str]:
     yield from table(head, cells)
 
 
-def _figure_lines(figures: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yield the figures with their captions."""
-    if not figures:
-        yield "None: no problem converged."
-    for file, caption in figures:
-        yield f"![{caption}]({file})\n\n*{caption}*\n"
-
-
 Metrics = Mapping[str, Any]
 
 _SHAPING: Final = frozenset({*COORDINATES[2:], *STIFFNESSES, "duration", "walking_speed",
@@ -260,21 +253,16 @@ def _optima(result: ProblemResult) -> Iterator[str]:
     optima = result.metrics["local_optima"]
     best = optima[0]["cost"]
     yield f"\n{result.problem}, {len(optima)} starts:\n"
+    shares = [100.0 * (each["cost"] - best) / abs(best) if best and each["cost"] is not None
+              else None for each in optima]  # fmt: skip
     rows = [
         (str(each["start"]), each["status"], plain(each["cost"], ".4f"),
-         _above(each["cost"], best), plain(each["walking_speed"], ".3f"),
+         "-" if share is None else f"{share:+.1f} %", plain(each["walking_speed"], ".3f"),
          ", ".join(plain(k, ".1f") for k in each["stiffness"]) or "-",
          str(each["iterations"]), plain(each["seconds"], ".0f"), each["description"])
-        for each in optima
+        for each, share in zip(optima, shares, strict=True)
     ]  # fmt: skip
     head = ("start", "status", "cost", "above the best", "speed [m/s]",
             "K_D right, left, K_P right, left [N m/rad]", "iterations", "seconds",
             "began with")  # fmt: skip
     yield from table(head, rows)
-
-
-def _above(cost: float | None, best: float | None) -> str:
-    """Return by how much a cost lies above the best one."""
-    if cost is None or not best:
-        return "-"
-    return f"{100.0 * (cost - best) / abs(best):+.1f} %"

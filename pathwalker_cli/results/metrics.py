@@ -120,12 +120,7 @@ def sha256(content: bytes) -> str:
 
 
 def run_inputs(case: Case, warm_start: str | Path | None = None) -> RunInputs:
-    """Return what a run is made from.
-
-    Args:
-        case: What is solved, and for whom.
-        warm_start: Folder of the run to begin with.
-    """
+    """Return what a run is made from."""
     kept = {"config": config_text(case.config), "patient_kept": case.patient_text}
     hashes = {name: sha256(text.encode()) for name, text in kept.items()}
     if case.content_hash is not None:

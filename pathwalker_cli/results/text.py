@@ -154,19 +154,14 @@ def bound_line(bound: ActiveBound) -> str:
 
 
 def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return label and text of proof, active bounds, stages and times.
-
-    Args:
-        solution: How the solve ended.
-        metrics: Its metrics as they were written.
-    """
-    worst = solution.violations[0]
+    """Return label and text of proof, active bounds, stages and times."""
+    worst, terms = solution.violations[0], solution.cost_terms
     errors = solution.reintegration
     again = f"{errors.worst_position:.1e} rad or m, {errors.worst_velocity:.1e} rad/s or m/s"
     stages = (f"{s.name} {s.iterations} in {s.seconds:.1f} s" for s in solution.stages)
     seconds = (f"{part} {metrics[f'seconds_{part}']:.1f}" for part in ("build", "solve", "verify"))
     rows = [
-        ("cost terms", _sum_text(solution.cost_terms)),
+        ("cost terms", " + ".join(f"{_words(n)} {v:.4g}" for n, v in terms.items() if v)),
         ("clinical goals", ", ".join(f"{_words(n)} {v:.4g}" for n, v in metrics["goals"].items())),
         ("largest violation", f"{worst.amount:.1e} ({worst.name})"),
         ("re-integration error", again),
@@ -183,11 +178,6 @@ def _balance_text(found: Mapping[str, float]) -> str:
     energy = f"{found['energy']:.1e} J of {found['work_scale']:.3g} J"
     momentum = f"{found['impulse']:.1e} N s of {found['impulse_scale']:.3g} N s"
     return f"work and energy within {energy}, forces and momentum within {momentum}"
-
-
-def _sum_text(terms: Mapping[str, float]) -> str:
-    """Return the terms that count, e.g. "effort per distance 0.2535 + walking speed -1.3"."""
-    return " + ".join(f"{_words(name)} {value:.4g}" for name, value in terms.items() if value)
 
 
 def _words(name: str) -> str:
@@ -287,11 +277,7 @@ def _in_words(generator: str) -> str:
 
 
 def notes_together(notes: Sequence[str]) -> tuple[str, ...]:
-    """Return what was filled in for a patient, lengths from body proportions in one sentence.
-
-    Args:
-        notes: Notes of the patient, one per number that was filled in.
-    """
+    """Return what was filled in for a patient, lengths from body proportions in one sentence."""
     begin = "segment length "
     lengths = [note for note in notes if note.startswith(begin)]
     names = ", ".join(note.removeprefix(begin).partition(":")[0] for note in lengths)

@@ -109,10 +109,6 @@ class StudyKind(Generic[Study, Result]):
     def require(self, config: StudyConfig, where: str) -> None:
         """Refuse a problem that the study cannot take.
 
-        Args:
-            config: The problem.
-            where: Where it comes from, for the message.
-
         Raises:
             ConfigError: If it lacks what is varied, or its neighbours cannot be solved.
         """
@@ -230,11 +226,6 @@ def resolver_of(run: Run, tolerance: float | None = None) -> Resolver:
 
 def require_optimum(resolver: Resolver, run: Run, tolerance: float) -> Optimum:
     """Return the optimum around which a resolver solves neighbours.
-
-    Args:
-        resolver: The solver of neighbours of the run.
-        run: The run, for the message.
-        tolerance: Optimality tolerance of the solves, for the message.
 
     Raises:
         NotConvergedError: If the optimum cannot be solved to the tolerance.

@@ -35,9 +35,6 @@ _CANDIDATES: Final = 2
 def verdict_of(solution: GaitSolution) -> Verdict | None:
     """Return the verdict on an identification, solving its neighbourhood.
 
-    Args:
-        solution: A converged solution by collocation.
-
     Returns:
         None where there is no number to judge: nothing free to choose, half a cycle (where both
         sides are one), or a solution that is not one.

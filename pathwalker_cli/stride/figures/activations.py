@@ -17,12 +17,7 @@ _DIRECTIONS = ("extension", "flexion")
 
 
 def activations(series: GaitSeries, reference: Reference | None = None) -> Figure:
-    """Return activation and excitation of every generator over the gait cycle of its side.
-
-    Args:
-        series: The stride.
-        reference: Not used: activations are not recorded.
-    """
+    """Return activation and excitation of every generator over the gait cycle of its side."""
     fig = style.new_figure(4.6)
     grid = fig.subplots(4, 4, sharex=True, sharey=True)
     columns = tuple(product(SIDES, _DIRECTIONS))

@@ -26,10 +26,6 @@ def orthosis_curves(series: GaitSeries, reference: Reference | None = None) -> F
 
     Dorsiflexion is positive, and so is the torque with which the orthosis resists it.
 
-    Args:
-        series: The stride, with orthoses.
-        reference: Not used: the torque of an orthosis is not recorded.
-
     Raises:
         InputError: If the walker wears no orthoses.
     """

@@ -63,7 +63,10 @@ def run_batch(
         release_runs(place / CASES)
         waiting = ledger.recall()
         watch.begin(len(cases), len(cases) - len(waiting), pool.workers)
-        tasks = [_task(case, ledger.run_folder(case)) for case in waiting]
+        tasks = [
+            Task(c.name, c.study, str(ledger.run_folder(c)), str(c.warm_start or ""))
+            for c in waiting
+        ]
         try:
             for name, result in pool.run(tasks, work) if tasks else ():
                 watch.ended(ledger.record(name, result))
@@ -76,12 +79,6 @@ def run_batch(
         finally:
             release_runs(place / CASES)
     return Report(folder, ledger.ended)
-
-
-def _task(case: BatchCase, folder: Path) -> Task:
-    """Return a case as it travels."""
-    start = "" if case.warm_start is None else str(case.warm_start)
-    return Task(case.name, case.study, str(folder), start)
 
 
 _SHOWN: Final = 30

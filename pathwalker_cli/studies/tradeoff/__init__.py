@@ -11,7 +11,6 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field, field_validator
 
-from pathwalker_cli.case import Case
 from pathwalker_cli.config.schema import Weight
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
@@ -83,7 +82,7 @@ def tradeoff_of(study: TradeoffStudy, run: Run, work: Work) -> Tradeoff:
     """
     near = Neighbours(run, work.folder / "points", study.max_iterations, work.report)
     base = run.config.cost.walking_speed_weight
-    solve = near.solver(lambda values: _with_weight(run.case, values))
+    solve = near.solver(lambda w: run.case.with_values({"cost.walking_speed_weight": w[0]}))
     rules: Rules[Optimum] = Rules(
         lambda one, other: 1.0, motion_signature, without_reward, jump=0.0, sweeps=study.sweeps
     )
@@ -98,11 +97,6 @@ def tradeoff_of(study: TradeoffStudy, run: Run, work: Work) -> Tradeoff:
             point = refined.point(point, branches[0].end)
         points.append(point)
     return _result(near, explored, judged(points), refined.seconds)
-
-
-def _with_weight(case: Case, values: Values) -> Case:
-    """Return a case with another weight of walking speed, the only one of the values."""
-    return case.with_values({"cost.walking_speed_weight": values[0]})
 
 
 def without_reward(optimum: Optimum) -> float:
