@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
 
 import numpy as np
 
@@ -28,12 +27,9 @@ from pathwalker_cli.studies.landscape.figures import Chosen
 from pathwalker_cli.studies.landscape.result import Landscape
 from pathwalker_cli.studies.measures import COMPARED, Ranges
 from pathwalker_cli.studies.registry import STUDIES
-from pathwalker_cli.studies.sensitivity.result import label_of
+from pathwalker_cli.studies.sensitivity.result import SHOWN, elasticity_text, label_of
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 from pathwalker_cli.studies.uncertainty.result import Spread, shown_text
-
-_LEAST: Final = 1e-3
-"""Elasticity [% per %] below which a number moves nothing that matters."""
 
 
 def study_section(study: Study, run: ReportRun) -> Section:
@@ -77,13 +73,13 @@ def _sensitivity(summary: SensitivitySummary) -> Section:
     for place, values in elasticities.items():
         numbers = [values.get(measure.key) for measure in shown]
         if any(map(_moves, numbers)):
-            rows.append(Row((label_of(place), *map(_elasticity, numbers))))
+            rows.append(Row((label_of(place), *map(elasticity_text, numbers))))
     table = Table(
         ("one per cent more of", *(m.short for m in shown)),
         tuple(rows),
         caption="Elasticities at the optimum, % per %; a spring moves with the others following",
         notes=(
-            f"a dot is less than {_LEAST:g}; numbers that move nothing are left out",
+            f"a dot is less than {SHOWN:g}; numbers that move nothing are left out",
             "beyond a change of the active set the numbers no longer hold",
         ),
     )
@@ -92,13 +88,7 @@ def _sensitivity(summary: SensitivitySummary) -> Section:
 
 def _moves(value: float | None) -> bool:
     """Return whether an elasticity is worth showing."""
-    return value is not None and abs(value) >= _LEAST
-
-
-def _elasticity(value: float | None) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.3f}" if _moves(value) else "."
+    return value is not None and abs(value) >= SHOWN
 
 
 def _perturbation(summary: PerturbationSummary) -> Section:

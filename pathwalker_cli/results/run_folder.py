@@ -343,18 +343,25 @@ def _read_metrics(folder: Path) -> dict[str, Any]:
     return metrics
 
 
+def load_converged(folder: str | Path, where: str = "", mend: str = "") -> Run:
+    """Return a run that somebody named at `where`.
+
+    Raises:
+        DataError: If it cannot be used or did not converge.
+    """
+    try:
+        return load_run(folder)
+    except NotConvergedError as error:
+        raise DataError(str(error), where=where, allowed="a converged run", mend=mend) from None
+
+
 def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
     """Return the run that a solve shall begin with.
 
     Raises:
         DataError: If it cannot be used, did not converge or is about another condition.
     """
-    try:
-        run = load_run(folder)
-    except NotConvergedError as error:
-        raise DataError(
-            str(error), where="--warm-start", allowed="a converged run", mend="solve it again first"
-        ) from None
+    run = load_converged(folder, "--warm-start", "solve it again first")
     if run.config.condition != config.condition:
         raise DataError(
             f"is a run of {run.config.problem} ({run.config.condition}), whose free parameters "

@@ -19,7 +19,7 @@ from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.atomic import check_room, sweep
 from pathwalker_cli.io.fields import YamlModel
 from pathwalker_cli.io.lock import locked
-from pathwalker_cli.results.run_folder import Run, load_run
+from pathwalker_cli.results.run_folder import Run, load_converged, load_run
 from pathwalker_cli.studies.run import RunLog, done_run, run_study
 
 _TRANSCRIPTION: Final = "collocation"
@@ -195,10 +195,7 @@ def _given(study: NeighbourStudy, folder: Path) -> Run:
             where="set",
             mend="leave one of the two out",
         )
-    try:
-        return load_run(folder)
-    except NotConvergedError as error:
-        raise DataError(str(error), where="--run", allowed="a converged run") from None
+    return load_converged(folder, "--run")
 
 
 def base_run(case: Case, folder: Path, log: RunLog | None = None) -> Run:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -36,14 +34,9 @@ def orthosis_curves(series: GaitSeries, reference: Reference | None = None) -> F
     for i, (ax, side) in enumerate(zip(panels, SIDES, strict=True)):
         _draw_orthosis(ax, series, side, series.walker.orthosis[i])
         style.dress(ax, _title(series, side), _ANGLE, _TORQUE if i == 0 else "")
-    style.legend(
-        fig,
-        [
-            style.entry("curve", linewidth=0.8),
-            style.entry("part that was walked", linewidth=3.0, alpha=0.5),
-            style.entry("stop", linewidth=0.8, linestyle="-."),
-        ],
-    )
+    curve, stop = style.entry("curve", linewidth=0.8), {"linewidth": 0.8, "linestyle": "-."}
+    walked = style.entry("part that was walked", linewidth=3.0, alpha=0.5)
+    style.legend(fig, [curve, walked, style.entry("stop", **stop)])
     return fig
 
 
@@ -87,14 +80,10 @@ def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figu
     for i, (ax, side) in enumerate(zip(panels, SIDES, strict=True)):
         _draw_profile(ax, series, side)
         style.dress(ax, f"{side.capitalize()} ankle", _ANGLE, _TORQUE if i == 0 else "")
-    style.legend(
-        fig,
-        [
-            style.entry("foot flat or on its toe", linewidth=1.6),
-            style.entry("swing and heel contact", linewidth=0.6),
-            style.entry("mean slope", color="black", linewidth=0.8, linestyle=":"),
-        ],
-    )
+    bearing = style.entry("foot flat or on its toe", linewidth=1.6)
+    other = style.entry("swing and heel contact", linewidth=0.6)
+    slope = style.entry("mean slope", color="black", linewidth=0.8, linestyle=":")
+    style.legend(fig, [bearing, other, slope])
     return fig
 
 
@@ -103,11 +92,8 @@ def _draw_profile(ax: Axes, series: GaitSeries, side: Side) -> None:
     name = f"ankle_{SUFFIX[side]}"
     angle = -series.column(name)
     torque = series.net_torque[:, COORDINATES.index(name)]
-    bearing, (slope, offset) = (
-        toe_bearing(series.phase, side),
-        ankle_torque_line(stride_of(series), side),
-    )
-    look: dict[str, Any] = {"color": style.LINE_COLOUR[side], "linestyle": style.LINE_STYLE[side]}
+    bearing, look = toe_bearing(series.phase, side), style.side_line(side)
+    slope, offset = ankle_torque_line(stride_of(series), side)
     style.zero_line(ax)
     ax.plot(to_degrees(angle), torque, linewidth=0.6, **look)
     thick = np.where(bearing, torque, np.nan)

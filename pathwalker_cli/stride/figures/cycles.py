@@ -1,8 +1,9 @@
-"""Figures of joint angles, joint moments and ground forces over the gait cycle of each side."""
+"""Figures of angles, moments, ground forces and activations over the gait cycle of each side."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from typing import Any, Final
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pathwalker_cli.conventions import SIDES, SUFFIX, Side
+from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side
 from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.curves import (
     ANGLES,
@@ -94,7 +95,7 @@ def _draw(
 
 def _draw_side(ax: Axes, series: GaitSeries, side: Side, values: np.ndarray, **more: Any) -> None:
     cycle, look = own_cycle(series, side), style.side_line(side)
-    ax.plot(cycle.percent, values[cycle.index], **look, **more)
+    ax.plot(cycle.percent, values[cycle.index], **(look | more))
 
 
 def _draw_band(ax: Axes, band: Band, side: Side, factor: float) -> None:
@@ -105,3 +106,37 @@ def _draw_band(ax: Axes, band: Band, side: Side, factor: float) -> None:
     for edge in (low, high):  # so that the ranges of both sides differ without colour too
         ax.plot(band.percent, edge, linewidth=0.4, **look)
     ax.plot(band.percent, factor * band.mean, linewidth=0.7, **look)
+
+
+def activations(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return activation and excitation of every generator over the gait cycle of its side."""
+    fig = style.new_figure(4.6)
+    grid = fig.subplots(4, 4, sharex=True, sharey=True)
+    columns = tuple(product(SIDES, ("extension", "flexion")))
+    for row, joint in zip(grid, LEG_JOINTS, strict=False):
+        for ax, (side, direction) in zip(row, columns, strict=True):
+            name = f"{joint}_{direction}_{SUFFIX[side]}"
+            _draw_generator(ax, series, name, side, f"{side.capitalize()} {joint}\n{direction}")
+    _draw_generator(grid[-1][0], series, "lumbar_extension", "right", "Trunk\nforward")
+    _draw_generator(grid[-1][1], series, "lumbar_flexion", "right", "Trunk\nbackward")
+    for row in grid:
+        row[0].set_ylabel("activation [1]", labelpad=2.0)
+    for top, ax in zip(grid[-2][2:], grid[-1][2:], strict=True):  # two panels have no generator
+        ax.axis("off")
+        style.percent_axis(top, "own cycle\n[%]")
+        top.xaxis.set_tick_params(labelbottom=True)
+    for ax in grid[-1][:2]:
+        style.percent_axis(ax, "right cycle\n[%]")
+    grid[0][0].set_ylim(-0.03, 1.05)
+    grid[0][0].set_yticks([0.0, 0.5, 1.0])
+    thin = style.entry("thin: excitation", linewidth=0.6)
+    style.legend(fig, [*style.side_handles(), thin, style.events_handle()])
+    return fig
+
+
+def _draw_generator(ax: Axes, series: GaitSeries, name: str, side: Side, title: str) -> None:
+    column, thin = GENERATORS.index(name), {"linewidth": 0.6, "linestyle": "-"}
+    style.dress(ax, title)
+    _draw_side(ax, series, side, series.excitation[:, column], **thin)
+    _draw_side(ax, series, side, series.activation[:, column])
+    style.toe_off_line(ax, own_cycle(series, side))

@@ -10,10 +10,14 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from pathwalker_cli.io.atomic import atomic_path
-from pathwalker_cli.stride.figures.activations import activations
 from pathwalker_cli.stride.figures.ankle import ankle_torque, orthosis_curves
 from pathwalker_cli.stride.figures.curves import Reference
-from pathwalker_cli.stride.figures.cycles import ground_forces, joint_angles, joint_moments
+from pathwalker_cli.stride.figures.cycles import (
+    activations,
+    ground_forces,
+    joint_angles,
+    joint_moments,
+)
 from pathwalker_cli.stride.figures.stick_figures import stick_figures
 from pathwalker_cli.stride.figures.style import STYLE
 from pathwalker_cli.stride.series import GaitSeries

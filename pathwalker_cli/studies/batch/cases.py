@@ -58,12 +58,7 @@ class BatchCase:
 
 @dataclass(frozen=True)
 class Batch:
-    """A study of many cases, checked.
-
-    Args:
-        name: Its name: that of its file.
-        cases: The cases in order.
-    """
+    """A study of many cases, checked; its name is that of its file."""
 
     name: str
     cases: tuple[BatchCase, ...]

@@ -37,11 +37,7 @@ _PROOF: Final = {
 
 
 class CaseTable:
-    """Headers and rows of the cases of one study.
-
-    Args:
-        cases: All cases in order.
-    """
+    """Headers and rows of all cases of one study, in order."""
 
     def __init__(self, cases: Sequence[BatchCase]) -> None:
         self._named = any(case.variant for case in cases)
@@ -170,12 +166,7 @@ class Ended:
 
 
 class Ledger:
-    """Rows of all cases, in memory and in the folder of the study.
-
-    Args:
-        cases: All cases in order.
-        folder: Full path of the study's folder.
-    """
+    """Rows of all cases, in order, in memory and in the folder of the study."""
 
     def __init__(self, cases: Sequence[BatchCase], folder: Path) -> None:
         self._cases = {case.name: case for case in cases}

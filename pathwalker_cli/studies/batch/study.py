@@ -30,12 +30,7 @@ class Watch:
 
 @dataclass(frozen=True)
 class Report:
-    """How a study ended.
-
-    Args:
-        folder: Its folder.
-        ended: How every case ended, in order.
-    """
+    """How a study ended: its folder, and every case in order."""
 
     folder: Path
     ended: tuple[Ended, ...]

@@ -75,12 +75,7 @@ class Distribution(YamlModel):
 
 @dataclass(frozen=True)
 class Input:
-    """One number, or one block of numbers that change together, that is drawn.
-
-    Args:
-        place: Its place in the patient's file.
-        distribution: Its distribution.
-    """
+    """One number that is drawn, or one block of them that change together, by its place."""
 
     place: str
     distribution: Distribution
