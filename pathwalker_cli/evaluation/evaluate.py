@@ -86,6 +86,11 @@ class Change:
         """The change; negative: less with orthoses."""
         return self.orthosis - self.barefoot
 
+    @property
+    def percent(self) -> str:
+        """The change over the barefoot value [%], with its sign; "" where that is zero."""
+        return f"{100.0 * self.value / self.barefoot:+.0f}" if self.barefoot else ""
+
 
 @dataclass(frozen=True)
 class Evaluation:

@@ -42,11 +42,10 @@ def change_lines(changes: Sequence[Change]) -> Iterator[str]:
         yield section
         for row in rows:
             measure = row.measure
-            share = f"{100.0 * row.value / row.barefoot:+.0f}" if row.barefoot else ""
             yield _change_line(
                 measure.row, measure.text(row.barefoot), measure.text(row.orthosis),
-                measure.text(row.value, sign=True), share, measure.text(row.recorded, sign=True),
-                str(row.paper or ""), measure.shown_unit,
+                measure.text(row.value, sign=True), row.percent,
+                measure.text(row.recorded, sign=True), str(row.paper or ""), measure.shown_unit,
             )  # fmt: skip
 
 

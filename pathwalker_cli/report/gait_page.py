@@ -69,8 +69,8 @@ def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
     saved = ""
     if effort is not None:
         values = [effort.measure.text(v) for v in (effort.barefoot, effort.orthosis)]
-        share = 100.0 * effort.value / effort.barefoot
-        saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot ({share:+.0f} %)"
+        saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot"
+        saved += f" ({effort.percent} %)"
     real = run.verdict is not None and run.verdict.snapped is not None
     kind = "Springs to take" if real else "Springs found"
     if all(prescribed(run, name) for name in STIFFNESSES):
@@ -173,8 +173,5 @@ def _change_cells(change: Change | None) -> tuple[str, str, str]:
     """Return the change, its share and the recorded one."""
     if change is None:
         return "-", "-", "-"
-    share = f"{100.0 * change.value / change.barefoot:+.0f}" if change.barefoot else "-"
-    measure = change.measure
-    return (
-        measure.text(change.value, sign=True), share, measure.text(change.recorded, sign=True)
-    )  # fmt: skip
+    text = change.measure.text
+    return text(change.value, sign=True), change.percent or "-", text(change.recorded, sign=True)
