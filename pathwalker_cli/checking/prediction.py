@@ -113,11 +113,6 @@ def expected(config: StudyConfig, intervals: int) -> Seconds:
 def check_prediction(path: str, changes: Changes = (), problem: str = "") -> Checked:
     """Return what a solve of a config would do.
 
-    Args:
-        path: The config, a file or the name of a shipped one.
-        changes: Overrides "dotted.key=value".
-        problem: Problem that it must be of.
-
     Raises:
         InputError: The first thing that is wrong.
     """

@@ -91,12 +91,7 @@ def ankle_pair(shown: Sequence[Trace], head: float = 0.0) -> Figure:
 
 
 def save_evaluation_figures(trace: Trace, folder: str | Path) -> tuple[str, ...]:
-    """Save the figures that a gait allows as PNG and SVG; return the file names.
-
-    Args:
-        trace: The gait over its recordings.
-        folder: Where; made if it does not exist.
-    """
+    """Save the figures that a gait allows as PNG and SVG; return the file names."""
     makers: dict[str, Callable[[], Figure]] = {
         name: partial(cycle_figure, trace, curves)
         for name, curves in {"joint_angles": ANGLES, "ground_forces": FORCES}.items()
@@ -108,12 +103,7 @@ def save_evaluation_figures(trace: Trace, folder: str | Path) -> tuple[str, ...]
 
 
 def save_overlays(shown: Sequence[Trace], folder: str | Path) -> tuple[str, ...]:
-    """Save figures of several gaits over one another as PNG and SVG; return the file names.
-
-    Args:
-        shown: The gaits.
-        folder: Where; made if it does not exist.
-    """
+    """Save figures of several gaits over one another as PNG and SVG; return the file names."""
     head = 0.18 * len(shown) + 0.1
     groups = {
         "joint_angles": ANGLES,

@@ -41,9 +41,6 @@ def run_names(folders: Sequence[Path]) -> tuple[str, ...]:
 def stride_of_run(folder: str | Path) -> tuple[Run, GaitSeries]:
     """Return a converged run and its time series.
 
-    Args:
-        folder: The folder that `pathwalker solve` wrote.
-
     Raises:
         DataError: If it is no run folder, did not converge or holds no full stride.
         PatientError: If the patient that it keeps is damaged.
@@ -59,9 +56,6 @@ def run_notes(run: Run) -> tuple[str, ...]:
 
 def gait_of_run(folder: str | Path) -> Stride:
     """Return the gait of a converged run.
-
-    Args:
-        folder: The folder that `pathwalker solve` wrote.
 
     Raises:
         DataError: If it is no run folder, did not converge or holds no full stride.

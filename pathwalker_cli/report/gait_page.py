@@ -124,12 +124,7 @@ def _coarse(run: ReportRun) -> bool:
 
 
 def gait_section(runs: Sequence[ReportRun], changes: Sequence[Change]) -> Section:
-    """Return the table of steps, times, crouch, forces and effort.
-
-    Args:
-        runs: The runs.
-        changes: From barefoot to orthosis; none where there are not both.
-    """
+    """Return the table of steps, times, crouch, forces and effort."""
     head, columns = ["", "unit"], "ww"
     for run in runs:
         head += [run.label, *(["recorded, mean [min, max]", "is"] if _compared(run) else [])]

@@ -44,10 +44,6 @@ _Plan = tuple[str, str, Callable[[], Figure]]
 def save_paper_figures(results: Results, folder: Path) -> tuple[tuple[str, str], ...]:
     """Save the figures that the results allow as PNG and SVG.
 
-    Args:
-        results: What was computed.
-        folder: Where; made if it does not exist.
-
     Returns:
         PNG file name and caption of every figure.
     """

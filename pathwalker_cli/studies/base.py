@@ -263,12 +263,7 @@ def check_folder(folder: Path, entries: frozenset[str], command: str) -> None:
 
 @contextmanager
 def claimed_folder(folder: Path, entries: frozenset[str], command: str) -> Iterator[None]:
-    """Keep other processes out of the folder of a study, and tidy up after killed ones.
-
-    Args:
-        folder: Where results shall go; see `check_folder`.
-        entries: Names of all files and folders that the command writes there.
-        command: The command, for the message.
+    """Keep others out of the folder of a study, see `check_folder`, and tidy up after killed ones.
 
     Raises:
         DataError: If it cannot take the results, or another process is at work there.

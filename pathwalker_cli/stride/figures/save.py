@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -59,39 +59,20 @@ def make_figure(name: str, series: GaitSeries, reference: Reference | None = Non
 
 
 def save_figures(
-    series: GaitSeries,
-    folder: str | Path,
-    reference: Reference | None = None,
-    formats: Sequence[str] = FORMATS,
+    series: GaitSeries, folder: str | Path, reference: Reference | None = None
 ) -> tuple[str, ...]:
-    """Save every figure of a stride and return the file names.
-
-    Args:
-        series: The stride.
-        folder: Where; made if it does not exist.
-        reference: Recorded bands to draw behind.
-        formats: "png", "svg" or both.
-    """
+    """Save every figure of a stride over recorded bands; return the file names."""
     return tuple(
         file
         for name in figure_names(series)
-        for file in save_formats(make_figure(name, series, reference), folder, name, formats)
+        for file in save_formats(make_figure(name, series, reference), folder, name)
     )
 
 
-def save_formats(
-    figure: Figure, folder: str | Path, name: str, formats: Sequence[str] = FORMATS
-) -> tuple[str, ...]:
-    """Save a figure in several formats and return the file names.
-
-    Args:
-        figure: A figure made under `style.STYLE`.
-        folder: Where; made if it does not exist.
-        name: Name of the files without extension.
-        formats: "png", "svg" or both.
-    """
+def save_formats(figure: Figure, folder: str | Path, name: str) -> tuple[str, ...]:
+    """Save a figure made under `style.STYLE` in all formats; return the file names."""
     Path(folder).mkdir(parents=True, exist_ok=True)
-    files = tuple(f"{name}.{extension}" for extension in formats)
+    files = tuple(f"{name}.{extension}" for extension in FORMATS)
     for file in files:
         save_figure(figure, Path(folder) / file)
     return files

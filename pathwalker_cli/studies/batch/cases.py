@@ -67,10 +67,6 @@ class Batch:
 def load_cases(path: str | Path, changes: tuple[str, ...] = ()) -> Batch:
     """Read a study and check every case before the first is solved.
 
-    Args:
-        path: The YAML file, or the name of a shipped one.
-        changes: Overrides "key=value" of the study's own keys.
-
     Raises:
         InputError: If study, patient, config, warm start or a combination of them is wrong.
     """
@@ -221,11 +217,6 @@ def _files(path: Path) -> list[Path]:
 
 def listed_problems(entries: tuple[str, ...], folder: Path, where: str) -> dict[str, StudyConfig]:
     """Return the config of every problem by its name, which is that of its file.
-
-    Args:
-        entries: Names of shipped configs, or config files.
-        folder: Folder that they are relative to.
-        where: The study, for messages.
 
     Raises:
         ConfigError: If a config is missing or refused, or a name stands twice.

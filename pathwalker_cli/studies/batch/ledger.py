@@ -51,13 +51,7 @@ class CaseTable:
     def row(
         self, case: BatchCase, status: str, metrics: Mapping[str, Any] | None = None
     ) -> tuple[str, ...]:
-        """Return the row of a case.
-
-        Args:
-            case: The case.
-            status: "converged", or why not.
-            metrics: Content of the run's `metrics.json`; None if there is no run.
-        """
+        """Return the row of a case."""
         row = [case.name, case.patient, case.problem, *map(_varied, case.values.values())]
         row += [case.variant] if self._named else []
         return (*row, status, *numbers_of(status, metrics).values())

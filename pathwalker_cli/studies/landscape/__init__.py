@@ -186,11 +186,6 @@ def _around(values: np.ndarray, value: float) -> tuple[int, ...]:
 def landscape_of(study: LandscapeStudy, run: Run, work: Work) -> Landscape:
     """Solve a landscape.
 
-    Args:
-        study: What was asked for.
-        run: The converged run to stand on.
-        work: Where; solved points are kept there and not solved again.
-
     Raises:
         ConfigError: If an axis is wrong, or the base ties the sides.
         NotConvergedError: If the user stopped it, or there is nothing to begin with.

@@ -128,11 +128,6 @@ def plan(asked: SensitivityStudy, solver: GaitSolver) -> Plan:
 def sensitivities(asked: SensitivityStudy, run: Run, work: Work) -> Sensitivities:
     """Return the sensitivities of an optimum.
 
-    Args:
-        asked: What is asked.
-        run: The converged run.
-        work: Where; re-solves of checks are kept there.
-
     Raises:
         ConfigError: If a place does not exist, or a check is asked for what is not.
         NotConvergedError: If the optimum cannot be solved to the tolerance.

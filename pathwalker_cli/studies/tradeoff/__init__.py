@@ -72,11 +72,6 @@ def chain(weights: tuple[float, ...], base: float) -> Graph:
 def tradeoff_of(study: TradeoffStudy, run: Run, work: Work) -> Tradeoff:
     """Solve a trade-off.
 
-    Args:
-        study: What was asked for.
-        run: The converged run to stand on.
-        work: Where: solved points in `points`, refined ones in `runs`.
-
     Raises:
         NotConvergedError: If the user stopped it.
     """
