@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -69,10 +69,12 @@ def save_figures(
     )
 
 
-def save_formats(figure: Figure, folder: str | Path, name: str) -> tuple[str, ...]:
-    """Save a figure made under `style.STYLE` in all formats; return the file names."""
+def save_formats(
+    figure: Figure, folder: str | Path, name: str, formats: Sequence[str] = FORMATS
+) -> tuple[str, ...]:
+    """Save a figure made under `style.STYLE` as PNG, SVG or both; return the file names."""
     Path(folder).mkdir(parents=True, exist_ok=True)
-    files = tuple(f"{name}.{extension}" for extension in FORMATS)
+    files = tuple(f"{name}.{extension}" for extension in formats)
     for file in files:
         save_figure(figure, Path(folder) / file)
     return files
