@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.report.content import Row, Section, Table
-from pathwalker_cli.report.figures import landscape_drawing, spread_drawing, tradeoff_drawing
+from pathwalker_cli.report.figures import drawn
 from pathwalker_cli.report.folders import Study
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.springs import recommended
@@ -23,12 +24,14 @@ from pathwalker_cli.report.summaries import (
     spreads_of,
 )
 from pathwalker_cli.stride.measures import measure_of, measures_in
-from pathwalker_cli.studies.landscape.figures import Chosen
+from pathwalker_cli.studies.landscape.figures import Chosen, cost_figure
 from pathwalker_cli.studies.landscape.result import Landscape
 from pathwalker_cli.studies.measures import COMPARED, Ranges
 from pathwalker_cli.studies.registry import STUDIES
 from pathwalker_cli.studies.sensitivity.result import SHOWN, elasticity_text, label_of
+from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
+from pathwalker_cli.studies.uncertainty.figures import spread_figure
 from pathwalker_cli.studies.uncertainty.result import Spread, shown_text
 
 
@@ -135,7 +138,9 @@ def _landscape(landscape: Landscape, run: ReportRun) -> Section:
         )
     if landscape.failed:
         lines.append(f"No solution at {len(landscape.failed)} of {len(landscape.bests)} points.")
-    drawing = landscape_drawing(landscape, springs, _chosen(run, landscape.side))
+    figure = partial(cost_figure, landscape, springs, _chosen(run, landscape.side))
+    title = "Cost above the least [%] over K_D and K_P [N m/rad]"
+    drawing = drawn(figure, "landscape", title, "tall")
     return Section("Landscape of the springs", tuple(lines), drawings=(drawing,))
 
 
@@ -174,7 +179,9 @@ def _tradeoff(tradeoff: Tradeoff) -> Section:
         "How much effort a faster gait takes: the objective weighs speed more and more. A "
         "dominated point is no faster and no cheaper than another one."
     ]
-    drawings = (tradeoff_drawing(tradeoff),) if tradeoff.solved else ()
+    title = "Effort per distance [s/m] and springs [N m/rad] over walking speed [m/s]"
+    figure = partial(tradeoff_figure, tradeoff)
+    drawings = (drawn(figure, "tradeoff", title, "tall"),) if tradeoff.solved else ()
     return Section("Trade-off of speed and effort", tuple(lines), tables=(table,),
                    drawings=drawings)  # fmt: skip
 
@@ -198,7 +205,9 @@ def _uncertainty(
     count = summary.draws - len(summary.failed)
     lines = [f"{summary.draws} draws of the uncertain numbers, {count} converged."]
     lines += [words for each in spreads if (words := _chance(each, summary.ranges))]
-    drawings = (spread_drawing(values, summary.ranges, spreads),) if count else ()
+    title = "Springs of all draws [N m/rad], and deviation of cost and gait from the base [%]"
+    figure = partial(spread_figure, values, summary.ranges, spreads)
+    drawings = (drawn(figure, "uncertainty", title, "tall"),) if count else ()
     table = Table(head, tuple(rows), columns="wwnnnp")
     return Section("Uncertainty of the patient's numbers", tuple(lines), tables=(table,),
                    drawings=drawings)  # fmt: skip
