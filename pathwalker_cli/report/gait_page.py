@@ -160,13 +160,8 @@ def _row(measure: Measure, runs: Sequence[ReportRun], changes: Sequence[Change])
             cells.append(spread_text(row.recorded if row else None, measure))
             cells.append((row.position or "") if row else "")
     if changes:
-        cells += _change_cells(next((c for c in changes if c.measure.key == measure.key), None))
+        change = next((c for c in changes if c.measure.key == measure.key), None)
+        value, recorded = (change.value, change.recorded) if change else (None, None)
+        cells += [measure.text(value, sign=True), (change and change.percent) or "-"]
+        cells.append(measure.text(recorded, sign=True))
     return Row(tuple(cells))
-
-
-def _change_cells(change: Change | None) -> tuple[str, str, str]:
-    """Return the change, its share and the recorded one."""
-    if change is None:
-        return "-", "-", "-"
-    text = change.measure.text
-    return text(change.value, sign=True), change.percent or "-", text(change.recorded, sign=True)

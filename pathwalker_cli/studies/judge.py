@@ -10,7 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.bounds import held
 from pathwalker_cli.gait.neighbourhood import Neighbourhood
@@ -76,11 +75,6 @@ class _Judge:
         self.optimum = self.around.optimum
         self.solves = 0
 
-    @property
-    def config(self) -> StudyConfig:
-        """The config of the optimum."""
-        return self.optimum.config
-
     def number(self, unknown: Unknown) -> NumberVerdict:
         """Return the verdict on one number."""
         value, limits = self.optimum.value(unknown), self.optimum.range(unknown)
@@ -130,7 +124,7 @@ class _Judge:
         self, values: Mapping[Unknown, float], start: Optimum | None = None, insist: bool = True
     ) -> Optimum:
         """Return the neighbour with some numbers prescribed."""
-        case = self.optimum.case.with_values(held(self.config, values))
+        case = self.optimum.case.with_values(held(self.optimum.config, values))
         return self.resolver.resolve(case, start, insist)
 
     def snapped(self) -> SnappedSprings | None:

@@ -65,7 +65,8 @@ def _draw_instant(ax: Axes, series: GaitSeries, percent: float, slot: float, hei
         if loaded(series, side)[row]:
             x = centre_of_pressure(series, side)[row] - series.q[row, 0] + slot
             force = (series.forward_force(side)[row], series.vertical_force(side)[row])
-            _draw_force(ax, x, scale * np.array(force))
+            ax.quiver([x], [0.0], [scale * force[0]], [scale * force[1]], color=style.FORCE_COLOUR,
+                      angles="xy", scale_units="xy", scale=1.0, width=0.006, zorder=5)  # fmt: skip
 
 
 def _draw_body(ax: Axes, points: dict[str, np.ndarray]) -> None:
@@ -88,9 +89,3 @@ def _draw_chain(
     """Draw a line from point to point."""
     x, z = np.array([points[name] for name in names]).T
     ax.plot(x, z, **look)
-
-
-def _draw_force(ax: Axes, x: float, arrow: np.ndarray) -> None:
-    """Draw a ground reaction force as an arrow from the ground at x."""
-    ax.quiver([x], [0.0], [arrow[0]], [arrow[1]], color=style.FORCE_COLOUR, angles="xy",
-              scale_units="xy", scale=1.0, width=0.006, zorder=5)  # fmt: skip

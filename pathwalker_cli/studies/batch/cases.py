@@ -15,7 +15,6 @@ from pathwalker_cli.errors import ConfigError, InputError, PatientError, placed
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.recorded import recorded_passage, recorded_stride, start_recording
 from pathwalker_cli.gait.symmetry import require_symmetry
-from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.patient import Patient, load_patient, shipped_patients
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.results.run_folder import warm_start_run
@@ -251,10 +250,20 @@ def check_case(name: str, case: Case, where: str) -> None:
     config = case.config
     with placed(f"{where}, case {name}"):
         check_patient(case)
-        _check_starts(config)
+        if config.starts > 1:
+            raise ConfigError(
+                f"is {config.starts}",
+                where="starts",
+                allowed="1, as the cores belong to the cases",
+                mend="spread the starts as cases, e.g. grid: {start.knee_flexion: [0.5, 0.7, 0.9]}",
+            )
         walker = case.walker(config.model.backend)
         gait_bounds(walker, config.bounds, config.free)
-        _check_start(config, walker)
+        if config.half_cycle:
+            require_symmetry(walker)
+        if config.start.gait == "recorded":
+            recording = start_recording(walker, config.start)
+            (recorded_passage if config.fits else recorded_stride)(walker, recording)
 
 
 def check_patient(case: Case) -> None:
@@ -271,26 +280,6 @@ def check_patient(case: Case) -> None:
             mend="add the orthosis to the file, or choose a barefoot problem for this patient",
         )
     _ = patient.max_isometric_torque
-
-
-def _check_starts(config: StudyConfig) -> None:
-    """Refuse a config for several processes."""
-    if config.starts > 1:
-        raise ConfigError(
-            f"is {config.starts}",
-            where="starts",
-            allowed="1, as the cores belong to the cases",
-            mend="spread the starts as cases, e.g. grid: {start.knee_flexion: [0.5, 0.7, 0.9]}",
-        )
-
-
-def _check_start(config: StudyConfig, walker: Walker) -> None:
-    """Refuse half a cycle of unequal sides, and a recorded start without a recording."""
-    if config.half_cycle:
-        require_symmetry(walker)
-    if config.start.gait == "recorded":
-        recording = start_recording(walker, config.start)
-        (recorded_passage if config.fits else recorded_stride)(walker, recording)
 
 
 def check_warm_start(folder: Path, config: StudyConfig, where: str) -> None:
