@@ -134,7 +134,9 @@ def common_view(drawings: Sequence[Drawing]) -> View:
         eye = (frames.middle + frames.cycle * frames.distance)[:, None]
         placed = (*(p[:, None] for p in each.points.values()), *each.arrows.values())
         wide = max(wide, *(float(np.nanmax(np.abs(p[..., 0] - eye))) for p in placed))
-        top = max(top, *(float(np.nanmax(p[..., 1])) for p in placed), _crown(frames))
+        head, neck = frames.points["head"], frames.points["neck"]
+        crown = float((head[:, 1] + np.linalg.norm(head - neck, axis=1)).max())
+        top = max(top, *(float(np.nanmax(p[..., 1])) for p in placed), crown)
     top += _MARGIN
     return View(max(wide + _MARGIN, (top + _BELOW) / 2), -_BELOW, top)
 
@@ -163,9 +165,10 @@ def _leg(points: Mapping[str, np.ndarray], side: Side, with_orthosis: bool) -> t
     chain = ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}")
     bones = [Shape("leg", a, b, _LINE, side=side) for a, b in pairwise(chain)]
     foot = Shape("foot", f"heel_{s}", f"toe_{s}", _foot(points, s), closed=True, side=side)
+    shank, sole = _shells()
     orthosis = (
-        Shape("shell", f"knee_{s}", f"ankle_{s}", _shank_shell(), closed=True, side=side),
-        Shape("shell", f"heel_{s}", f"toe_{s}", _foot_shell(), closed=True, side=side),
+        Shape("shell", f"knee_{s}", f"ankle_{s}", shank, closed=True, side=side),
+        Shape("shell", f"heel_{s}", f"toe_{s}", sole, closed=True, side=side),
         Shape("spring", f"spring_top_{s}", f"spring_foot_{s}", _zigzag(), side=side),
     )
     muscles = _muscles(points, ("hip", "knee", "ankle"), f"_{s}", side)
@@ -195,16 +198,10 @@ def _muscles(
             along = np.linspace(first, last, 11)
             near = np.stack([along, np.full(11, sign * _MUSCLE_GAP)], axis=1)
             far = np.stack([along, sign * (_MUSCLE_GAP + _MUSCLE_WIDTH * bulge)], axis=1)
+            lens = np.concatenate([near[[0, -1]], far[-2:0:-1]])
+            which = GENERATORS.index(f"{name}{suffix}")
             shapes.append(
-                Shape(
-                    "muscle",
-                    f"{start}{suffix}",
-                    f"{end}{suffix}",
-                    np.concatenate([near[[0, -1]], far[-2:0:-1]]),
-                    closed=True,
-                    side=side,
-                    generator=GENERATORS.index(f"{name}{suffix}"),
-                )
+                Shape("muscle", f"{start}{suffix}", f"{end}{suffix}", lens, True, side, which)
             )
     return tuple(shapes)
 
@@ -219,26 +216,14 @@ def _foot(points: Mapping[str, np.ndarray], s: str) -> np.ndarray:
     )
 
 
-def _shank_shell() -> np.ndarray:
-    """Return the shell around the shank."""
+def _shells() -> tuple[np.ndarray, np.ndarray]:
+    """Return the shell around the shank, and that under the foot with its cup behind the heel."""
     top, bottom, depth = _SHELL
-    return np.array([[top, depth], [bottom, depth], [bottom, -depth], [top, -depth]])
-
-
-def _foot_shell() -> np.ndarray:
-    """Return the shell under the foot with its cup behind the heel."""
+    shank = np.array([[top, depth], [bottom, depth], [bottom, -depth], [top, -depth]])
     rear, front, thickness, height = _SOLE
     inner = rear + 0.1
-    return np.array(
-        [
-            [rear, 0.0],
-            [front, 0.0],
-            [front, thickness],
-            [inner, thickness],
-            [inner, height],
-            [rear, height],
-        ]
-    )
+    return shank, np.array([[rear, 0.0], [front, 0.0], [front, thickness], [inner, thickness],
+                     [inner, height], [rear, height]])  # fmt: skip
 
 
 def _zigzag() -> np.ndarray:
@@ -252,13 +237,10 @@ def _zigzag() -> np.ndarray:
 def _spring_ends(points: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return where the springs hang on the shells, behind the ankles [m], shape (n, 2) each."""
     ends = {}
+    top, foot = np.array([[_SHELL[1], -_SHELL[2]]]), np.array([[_SOLE[0], _SOLE[3]]])
+    places = (("top", top, "knee", "ankle"), ("foot", foot, "heel", "toe"))
     for s in SUFFIX.values():
-        top = np.array([[_SHELL[1], -_SHELL[2]]])
-        foot = np.array([[_SOLE[0], _SOLE[3]]])
-        for name, corner, start, end in (
-            ("top", top, "knee", "ankle"),
-            ("foot", foot, "heel", "toe"),
-        ):
+        for name, corner, start, end in places:
             pairs = zip(points[f"{start}_{s}"], points[f"{end}_{s}"], strict=True)
             ends[f"spring_{name}_{s}"] = np.array([_placed(corner, a, b)[0] for a, b in pairs])
     return ends
@@ -279,9 +261,3 @@ def _arrows(frames: GaitFrames, side: Side) -> np.ndarray:
             outline = np.concatenate([upper, [[1.0, 0.0]], upper[::-1] * [1.0, -1.0]])
             arrows[i] = _placed(outline, start, start + scale * force)
     return arrows
-
-
-def _crown(frames: GaitFrames) -> float:
-    """Return the greatest height of the crown of the head [m]."""
-    head, neck = frames.points["head"], frames.points["neck"]
-    return float((head[:, 1] + np.linalg.norm(head - neck, axis=1)).max())

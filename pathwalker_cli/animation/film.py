@@ -111,11 +111,7 @@ def write_film(path: Path, runs: Sequence[GaitFrames], strides: int, rate: float
 
 @contextmanager
 def _writer(kind: str, rate: float) -> Iterator[AbstractMovieWriter]:
-    """Yield what puts frames together.
-
-    Raises:
-        DataError: If there is no program that makes MP4, or it fails.
-    """
+    """Yield what puts frames together."""
     if kind == ".gif":
         # It cuts 1000 / rate to whole milliseconds, where 29.999 would become 20.
         yield PillowWriter(fps=rate * (1.0 - 1e-9))  # type: ignore[arg-type]
@@ -132,11 +128,7 @@ def _writer(kind: str, rate: float) -> Iterator[AbstractMovieWriter]:
 
 
 def _ffmpeg() -> str:
-    """Return the ffmpeg of the system, or else the one that pip installed.
-
-    Raises:
-        DataError: If there is none.
-    """
+    """Return the ffmpeg of the system, or else the one that pip installed."""
     program = shutil.which("ffmpeg")
     if program is not None:
         return program
@@ -201,15 +193,12 @@ def _figure(drawings: Sequence[Drawing], slow: float) -> tuple[Figure, list[_Pan
         place = (edge / width, _FOOTER / height, _PANEL / width, _PANEL * shape / height)
         panels.append(_panel(figure.add_axes(place), each, view))
     _legend(figure, drawings, width, height)
-    lines = [pace([each.frames for each in drawings]), _slowed(slow), CAVEAT]
+    lines = [pace([each.frames for each in drawings]), CAVEAT]
+    if abs(slow - 1.0) >= 0.02:
+        lines.insert(1, f"The film takes {slow:.2f} times as long as the walk.")
     caption = fill(" ".join(line for line in lines if line), round(15 * width))
     figure.text(0.12 / width, 0.06 / height, caption, va="bottom", parse_math=False, fontsize=7)
     return figure, panels
-
-
-def _slowed(slow: float) -> str:
-    """Return how much longer the film takes than the walk; nothing if it takes as long."""
-    return "" if abs(slow - 1.0) < 0.02 else f"The film takes {slow:.2f} times as long as the walk."
 
 
 def _panel(axes: Axes, each: Drawing, view: View) -> _Panel:
@@ -234,14 +223,11 @@ def _panel(axes: Axes, each: Drawing, view: View) -> _Panel:
     now = [axes.text(x, 0.19 / high, "", fontsize=10, **head) for x in (0.02, 0.38, 0.52)]
     now[0].set_fontweight("bold")
     weight = force_scale(frames) * frames.weight
-    bar: dict[str, Any] = {
-        "transform": axes.get_yaxis_transform(),
-        "color": FORCE_COLOUR,
-        "linewidth": 1.5,
-    }
-    axes.plot([0.03, 0.03], [view.top - 0.05 - weight, view.top - 0.05], marker="_", **bar)
-    axes.text(0.05, view.top - 0.05, f"force of 1 body weight,\n{frames.weight:.0f} N",
-              transform=axes.get_yaxis_transform(), va="top", fontsize=8)  # fmt: skip
+    place, top = axes.get_yaxis_transform(), view.top - 0.05
+    bar: dict[str, Any] = {"color": FORCE_COLOUR, "linewidth": 1.5, "marker": "_"}
+    axes.plot([0.03, 0.03], [top - weight, top], transform=place, **bar)
+    told = f"force of 1 body weight,\n{frames.weight:.0f} N"
+    axes.text(0.05, top, told, transform=place, va="top", fontsize=8)
     looks = [(shape_look(shape), shape.closed) for shape in each.shapes]
     arrows = [arrow_look(side) for side in SIDES]
     return _Panel(
@@ -282,21 +268,13 @@ def _legend(figure: Figure, drawings: Sequence[Drawing], width: float, height: f
         Patch(facecolor="#ffffff", edgecolor=FORCE_COLOUR, label="left"),
     ]
     if any(each.frames.condition == "orthosis" for each in drawings):
-        handles.append(
-            Patch(facecolor=(SHELL_COLOUR, 0.45), edgecolor=SPRING_COLOUR, label="orthosis")
-        )
-    figure.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 0.4 / height),
-        ncols=len(handles),
-        frameon=False,
-        columnspacing=1.0,
-        handlelength=2.2,
-    )
+        shell = (SHELL_COLOUR, 0.45)
+        handles.append(Patch(facecolor=shell, edgecolor=SPRING_COLOUR, label="orthosis"))
+    figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 0.4 / height),
+                  ncols=len(handles), frameon=False, columnspacing=1.0,
+                  handlelength=2.2)  # fmt: skip
     scale = figure.add_axes((1.0 - 1.25 / width, 0.62 / height, 1.0 / width, 0.1 / height))
-    figure.colorbar(
-        ScalarMappable(cmap=_COLOURS), cax=scale, orientation="horizontal", ticks=[0, 1]
-    )
+    colours = ScalarMappable(cmap=_COLOURS)
+    figure.colorbar(colours, cax=scale, orientation="horizontal", ticks=[0, 1])
     scale.set_title("muscle activation", fontsize=7, pad=2)
     scale.tick_params(length=0, labelsize=7, pad=1)

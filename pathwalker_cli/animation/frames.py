@@ -111,15 +111,7 @@ def run_frames(folders: Sequence[Path], rate: float) -> tuple[GaitFrames, ...]:
 def gait_frames(
     series: GaitSeries, name: str, problem: str, count: int, notes: tuple[str, ...] = ()
 ) -> GaitFrames:
-    """Return a stride at evenly spaced instants from right foot strike on.
-
-    Args:
-        series: The stride.
-        name: What to call it.
-        problem: The problem that it solves.
-        count: Number of instants.
-        notes: What to know about it, one sentence each.
-    """
+    """Return a stride at `count` evenly spaced instants from right foot strike on."""
     strike = stride_of(series).strike("right")
     later = strike + series.duration * np.arange(count) / count
     again = later >= series.duration

@@ -93,12 +93,8 @@ def _parts(walker: Walker) -> Iterator[_Part]:
     above = _between(points, "hip_r", "lumbar")
     yield "pelvis", "pelvis_tilt", *_capsule(hips[0], hips[1], _PELVIS), dark
     yield "back", "pelvis_tilt", *_capsule(np.zeros(3), above, _PELVIS), dark
-    yield (
-        "trunk",
-        "lumbar",
-        *_capsule(np.zeros(3), _between(points, "lumbar", "neck"), _TRUNK),
-        dark,
-    )
+    neck = _between(points, "lumbar", "neck")
+    yield "trunk", "lumbar", *_capsule(np.zeros(3), neck, _TRUNK), dark
     head = _between(points, "lumbar", "head")
     radius = float(np.linalg.norm(points["head"] - points["neck"]))
     yield "head", "lumbar", coal.Sphere(radius), pin.SE3(np.eye(3), head), dark

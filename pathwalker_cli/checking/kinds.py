@@ -236,11 +236,7 @@ def another_kind(path: str, kind: str) -> ConfigError | None:
 
 
 def _kind_of(path: str) -> str:
-    """Return what a file, a shipped config or a patient is.
-
-    Raises:
-        ConfigError: If it cannot be read or told.
-    """
+    """Return what a file, a shipped config or a patient is."""
     if path in shipped_patients() or (Path(path) / "patient.yaml").is_file():
         return "patient"
     source, mapping, _ = config_content(path)
@@ -248,11 +244,7 @@ def _kind_of(path: str) -> str:
 
 
 def _kind(mapping: Mapping[str, Any], source: Path, where: str) -> str:
-    """Return what a file is: the kind that knows most of its keys; its name settles a tie.
-
-    Raises:
-        ConfigError: If no kind, or several, may be meant.
-    """
+    """Return what a file is: the kind that knows most of its keys; its name settles a tie."""
     if "problem" in mapping:
         return "prediction"
     if mapping.get("study") in KINDS:

@@ -35,13 +35,8 @@ def orthosis_content(patient: Patient) -> dict[str, Any] | None:
 def patient_rows(patient: Patient) -> list[Row]:
     """Return who a patient is."""
     source = f", {_shown(patient.source)}" if patient.source else ""
-    rows = [
-        ("patient", f"{patient.id}{source}"),
-        (
-            "",
-            f"{patient.sex}, {patient.age:g} years, {patient.body_mass:g} kg, {patient.height:g} m",
-        ),
-    ]
+    size = f"{patient.age:g} years, {patient.body_mass:g} kg, {patient.height:g} m"
+    rows = [("patient", f"{patient.id}{source}"), ("", f"{patient.sex}, {size}")]
     shares = strength_shares(patient)
     sides = [
         f"{name.replace('_', ' ')} {' / '.join(f'{100 * share:.0f}' for share in values)} %"

@@ -113,11 +113,6 @@ def expected(config: StudyConfig, intervals: int) -> Seconds:
 def check_prediction(path: str, changes: Changes = (), problem: str = "") -> Checked:
     """Return what a solve of a config would do.
 
-    Args:
-        path: The config, a file or the name of a shipped one.
-        changes: Overrides "dotted.key=value".
-        problem: Problem that it must be of.
-
     Raises:
         InputError: The first thing that is wrong.
     """
@@ -129,10 +124,6 @@ def check_prediction(path: str, changes: Changes = (), problem: str = "") -> Che
 
 def ready_solver(case: Case, where: str) -> GaitSolver:
     """Return the solver of a case, with everything checked that needs no solve.
-
-    Args:
-        case: The case.
-        where: Its file, for messages.
 
     Raises:
         InputError: The first thing that is wrong.

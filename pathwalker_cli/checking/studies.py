@@ -15,13 +15,7 @@ from pathwalker_cli.studies.registry import STUDIES
 
 
 def check_study(command: str, path: str, changes: Changes = ()) -> Checked:
-    """Return what the command of a study around an optimum would do.
-
-    Args:
-        command: The command.
-        path: Config of the study.
-        changes: Overrides "dotted.key=value".
-    """
+    """Return what the command of a study around an optimum would do."""
     entry = STUDIES[command]
     kind = entry.load()
     study = load_study(path, kind.model, changes)
@@ -33,22 +27,16 @@ def check_study(command: str, path: str, changes: Changes = ()) -> Checked:
         plan = kind.plan(study, solver)
     base = described(solver, path)
     about = f"{'at least ' * plan.least}{plan.solves}"
+    begin = f"{solver.config.problem}, {solver.walker.condition}, solved unless --run is given"
     rows: list[Row] = [
-        (
-            "base",
-            f"{solver.config.problem}, {solver.walker.condition}, solved unless --run is given",
-        ),
+        ("base", begin),
         *walker_rows(solver.walker),
         ("does", plan.does),
         ("solves", f"{about} neighbours of the base, each from its solution"),
         ("expected time", f"for the base {dict(base.rows)['expected time']}"),
     ]
-    content = {
-        "base": base.content,
-        "solves": plan.solves,
-        "solves_are_least": plan.least,
-        "does": plan.does,
-    }
+    content = {"base": base.content, "solves": plan.solves, "solves_are_least": plan.least,
+               "does": plan.does}  # fmt: skip
     return Checked(path, entry.name, tuple(rows), content, base.notes)
 
 
@@ -61,22 +49,21 @@ def check_batch(path: str, changes: Changes = ()) -> Checked:
         checked = described(ready_solver(case.study, f"{path}, case {case.name}"), path)
         seconds += checked.content["expected_seconds"]["likely"]
         notes += [note for note in checked.notes if note not in notes]
+    names = [case.name for case in batch.cases]
     patients = list(dict.fromkeys(case.patient for case in batch.cases))
     problems = list(dict.fromkeys(case.problem for case in batch.cases))
+    expected = f"about {seconds:.0f} s of one core in all, on the machine of docs/performance.md"
     rows: list[Row] = [
         ("patients", f"{len(patients)}: {', '.join(patients)}"),
         ("problems", ", ".join(problems)),
-        ("solves", f"{len(batch.cases)} cases: {', '.join(case.name for case in batch.cases)}"),
-        (
-            "expected time",
-            f"about {seconds:.0f} s of one core in all, on the machine of docs/performance.md",
-        ),
+        ("solves", f"{len(names)} cases: {', '.join(names)}"),
+        ("expected time", expected),
     ]
     content: dict[str, Any] = {
         "patients": patients,
         "problems": problems,
-        "cases": [case.name for case in batch.cases],
-        "solves": len(batch.cases),
+        "cases": names,
+        "solves": len(names),
         "expected_seconds": {"likely": round(seconds, 1)},
     }
     return Checked(path, "study of many cases", tuple(rows), content, tuple(notes))

@@ -92,11 +92,7 @@ def batch_command(
 def _pool(
     workers: int | None, scheduler: str | None, time_limit: float | None
 ) -> AbstractContextManager[Pool]:
-    """Return whoever solves the cases.
-
-    Raises:
-        ConfigError: If the options do not fit together.
-    """
+    """Return whoever solves the cases."""
     import os
 
     if scheduler is None:
@@ -110,11 +106,7 @@ def _pool(
 
 
 def _check_options(workers: int | None, scheduler: str, time_limit: float | None) -> None:
-    """Refuse options that do not go with a scheduler.
-
-    Raises:
-        ConfigError: If there are any.
-    """
+    """Refuse options that do not go with a scheduler."""
     from pathwalker_cli.errors import ConfigError
 
     if time_limit is not None:

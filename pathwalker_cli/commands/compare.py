@@ -93,11 +93,7 @@ def evaluate_command(
 
 
 def _trials(gaits: Sequence[Stride], trial: str | None) -> list[str | None]:
-    """Return the trial for each gait: the wanted one where its condition has it.
-
-    Raises:
-        DataError: If no condition has it.
-    """
+    """Return the trial for each gait: the wanted one where its condition has it."""
     from pathwalker_cli.errors import DataError
     from pathwalker_cli.io.recordings import recording_names
 

@@ -30,32 +30,22 @@ def init_command(
     comment with its unit and where to measure it. With --example, C3D files are made too: gait that
     was recorded of another child, played by the model of the made-up one. DIR must be new or empty.
     """
+    import re
+    import shlex
+
     from pathwalker_cli.starter.child import made_child
     from pathwalker_cli.starter.files import command_lines, next_steps, write_folder
 
-    child = made_child(name or _safe(folder.resolve().name), age, mass, height)
+    safe = re.sub(r"[^A-Za-z0-9_-]+", "-", folder.resolve().name).strip("-_")[:64] or "child"
+    child = made_child(name or safe, age, mass, height)
     with_orthosis = not without_orthosis
     write_folder(folder, child, with_orthosis, example)
     click.echo(
         f"Wrote {folder}: a made-up child of {child.age:g} years, {child.body_mass:g} kg and "
         f"{child.height:g} m.\n\nNext:\n"
     )
-    click.echo(f"{command_lines(f'cd {_quoted(folder)}', 2)}")
+    click.echo(f"{command_lines(f'cd {shlex.quote(str(folder))}', 2)}")
     for number, step in enumerate(next_steps(with_orthosis, example), start=1):
         click.echo(f"\n{click.wrap_text(f'{number}. {step.why}', 80, '# ', '# ')}")
         for command in step.commands:
             click.echo(command_lines(command, 2))
-
-
-def _safe(name: str) -> str:
-    """Return the name of a folder as an id."""
-    import re
-
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-_")[:64] or "child"
-
-
-def _quoted(folder: Path) -> str:
-    """Return a path as a shell takes it."""
-    import shlex
-
-    return shlex.quote(str(folder))

@@ -12,8 +12,6 @@ from pathwalker_cli.commands.options import out_option
 
 if TYPE_CHECKING:
     from pathwalker_cli.conventions import Condition
-    from pathwalker_cli.model.anthropometry import Segment
-    from pathwalker_cli.patient import Patient
 
 
 @click.command("model")
@@ -44,16 +42,9 @@ def model_command(patient: str, condition: str, out: Path | None, published: boo
         click.echo(text, nl=False)
     else:
         write_text(out, text)
-    for line in _summary(who, chosen, segments(who, chosen, published)):
-        click.echo(line, err=True)
-
-
-def _summary(patient: Patient, condition: Condition, parts: tuple[Segment, ...]) -> list[str]:
-    """Return the masses and what was filled in."""
-    total = sum(part.mass for part in parts)
+    parts = segments(who, chosen, published)
     masses = ", ".join(f"{part.name} {part.mass:.3f}" for part in parts)
-    return [
-        f"{patient.id}, {condition}: {total:.3f} kg in all",
-        f"masses [kg]: {masses}",
-        *(f"note: {note}" for note in patient.notes),
-    ]
+    click.echo(f"{who.id}, {chosen}: {sum(part.mass for part in parts):.3f} kg in all", err=True)
+    click.echo(f"masses [kg]: {masses}", err=True)
+    for note in who.notes:
+        click.echo(f"note: {note}", err=True)

@@ -64,11 +64,19 @@ def animate_command(
     ground forces, orthosis and muscle activations are drawn. A run that did not converge is
     refused.
     """
+    from pathwalker_cli.animation.frames import run_frames
+
     _check(runs, out, {"--strides": strides, "--fps": fps, "--slow": slow})
     if out.suffix.lower() == _PAGE:
-        _page(runs, out)
+        from pathwalker_cli.animation.html import RATE, html_page
+        from pathwalker_cli.io.atomic import write_text
+
+        write_text(out, html_page(run_frames(runs, RATE)))
     else:
-        _film(runs, out, strides or 1, fps or 25, slow or 1.0)
+        from pathwalker_cli.animation.film import film_rate, write_film
+
+        rate = film_rate(out, fps or 25)
+        write_film(out, run_frames(runs, rate * (slow or 1.0)), strides or 1, rate)
     click.echo(f"Written to {out}")
 
 
@@ -94,25 +102,6 @@ def _check(runs: tuple[Path, ...], out: Path, options: dict[str, float | None]) 
             mend=f"leave {given[0]} out",
         )
     check_output(out)
-
-
-def _page(runs: tuple[Path, ...], out: Path) -> None:
-    """Write a page."""
-    from pathwalker_cli.animation.frames import run_frames
-    from pathwalker_cli.animation.html import RATE, html_page
-    from pathwalker_cli.io.atomic import write_text
-
-    write_text(out, html_page(run_frames(runs, RATE)))
-
-
-def _film(runs: tuple[Path, ...], out: Path, strides: int, fps: float, slow: float) -> None:
-    """Write a film."""
-    from pathwalker_cli.animation.film import film_rate, write_film
-    from pathwalker_cli.animation.frames import run_frames
-
-    rate = film_rate(out, fps)
-    frames = run_frames(runs, rate * slow)
-    write_film(out, frames, strides, rate)
 
 
 @click.command("view")

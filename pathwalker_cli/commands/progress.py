@@ -26,12 +26,7 @@ PAUSE: Final = 0.1
 
 
 class _Lines:
-    """Where lines of progress are shown.
-
-    Args:
-        quiet: Whether nothing shall be shown.
-        console: Where to show it; stderr if left out.
-    """
+    """Where lines of progress are shown."""
 
     def __init__(self, quiet: bool, console: Console | None) -> None:
         self.console = console or Console(stderr=True)

@@ -63,10 +63,9 @@ def import_command(
     from pathwalker_cli.inverse.study import Paths, RecordedConfig
     from pathwalker_cli.inverse.trials import kinematics_trials
 
-    def write(folder: Path, trials: Sequence[Trial], who: Patient) -> _Findings:
+    def write(folder: Path, trials: Sequence[Trial], who: Patient) -> None:
         for trial in trials:
             write_trial(folder, trial)
-        return _Findings()
 
     files = Paths.model_validate({condition: c3d})
     config = RecordedConfig(patient=patient, conditions=(condition,), c3d=files, markers=markers)
@@ -84,9 +83,8 @@ def ik_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: b
     from pathwalker_cli.inverse.study import load_inverse_kinematics
     from pathwalker_cli.inverse.trials import kinematics_trials
 
-    def write(folder: Path, trials: Sequence[Trial], patient: Patient) -> _Findings:
+    def write(folder: Path, trials: Sequence[Trial], patient: Patient) -> None:
         write_kinematics(folder, trials, patient.body_mass)
-        return _Findings()
 
     with meant_as("inverse-kinematics", config):
         study = load_inverse_kinematics(config, changes)
@@ -176,19 +174,11 @@ class _Findings:
 def _study(
     config: Config,
     evaluate: Callable[[Config, Patient, Progress], Sequence[Trial]],
-    write: Callable[[Path, Sequence[Trial], Patient], _Findings],
+    write: Callable[[Path, Sequence[Trial], Patient], _Findings | None],
     out: Path,
     quiet: bool,
 ) -> None:
-    """Evaluate the trials of a config, write all files or none, and report.
-
-    Args:
-        config: The config.
-        evaluate: Returns its trials; names the one at work.
-        write: Writes the files into a folder.
-        out: Where the files shall be.
-        quiet: Whether to print warnings only.
-    """
+    """Evaluate the trials of a config, write all files or none, and report."""
     from rich.console import Console
 
     from pathwalker_cli.inverse.text import stance_notes, trial_warnings, trials_renderable
@@ -199,21 +189,18 @@ def _study(
     with staged_folder(out) as folder:
         with Console(stderr=True, quiet=quiet).status("") as status:
             trials = evaluate(config, patient, status.update)
-        findings = write(folder, trials, patient)
+        findings = write(folder, trials, patient) or _Findings()
     if findings.content is not None:
         content = {"folder": str(out), **findings.content, "updated": findings.changed or None}
         print_json({**content, "warnings": list(findings.warnings)})
     # As wide as the terminal, or wide enough without one.
     quiet = quiet or findings.content is not None
     console = Console(quiet=quiet, width=None if Console().is_terminal else 120)
-    console.print(trials_renderable(trials))
-    for note in stance_notes(trials):
-        console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
-    for table in findings.tables:
-        console.print(table)
-    console.print(f"Written to {out}", soft_wrap=True, markup=False, highlight=False)
-    if findings.changed:
-        console.print(findings.changed, soft_wrap=True, markup=False, highlight=False)
+    notes = [f"note: {note}" for note in stance_notes(trials)]
+    ends = [f"Written to {out}", *filter(None, [findings.changed])]
+    for part in (trials_renderable(trials), *notes, *findings.tables, *ends):
+        plain = isinstance(part, str)
+        console.print(part, soft_wrap=plain, markup=not plain, highlight=not plain)
     limit = config.largest_marker_distance
     for warning in (*trial_warnings(trials, patient.height, limit), *findings.warnings):
         click.echo(f"warning: {warning}", err=True)

@@ -63,11 +63,7 @@ def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, qui
 
 
 def _solve(case: Case, folder: Path, quiet: bool) -> None:
-    """Solve a study into its run folder.
-
-    Raises:
-        NotConvergedError: If the user stopped it: nothing further is wanted then.
-    """
+    """Solve a study into its run folder."""
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.studies.run import run_study

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -18,9 +18,7 @@ from pathwalker_cli.commands.options import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rich.console import Console
+    from collections.abc import Iterable, Sequence
 
     from pathwalker_cli.case import Case
     from pathwalker_cli.studies.run import Outcome
@@ -71,7 +69,8 @@ def solve_command(
         outcome = run_study(case, folder, warm_start, progress)
     solution = outcome.solution
     if as_json:
-        print_json(_content(outcome, folder))
+        ended = {"status": solution.status, "converged": solution.converged}
+        print_json({"folder": str(folder), **ended, "metrics": outcome.metrics})
     elif not quiet:
         _report(outcome, folder)
     if not solution.converged:
@@ -102,21 +101,8 @@ def _worn(case: Case) -> tuple[str, ...]:
     return tuple(f"{label}: {text}" for label, text in orthosis_rows(worn))
 
 
-def _content(outcome: Outcome, folder: Path) -> dict[str, Any]:
-    """Return how a run ended as plain values: where it is, its status, and metrics.json."""
-    status, converged = outcome.solution.status, outcome.solution.converged
-    return {
-        "folder": str(folder),
-        "status": status,
-        "converged": converged,
-        "metrics": outcome.metrics,
-    }
-
-
 def _report(outcome: Outcome, folder: Path) -> None:
     """Print the summary of a run."""
-    from rich.console import Console
-
     from pathwalker_cli.results.metrics import stiffness_ranges
     from pathwalker_cli.results.text import (
         detail_lines,
@@ -124,8 +110,6 @@ def _report(outcome: Outcome, folder: Path) -> None:
         optimum_lines,
         source_lines,
         spring_notes,
-        summary,
-        summary_renderable,
         summary_rows,
     )
     from pathwalker_cli.studies.verdict import verdict_lines
@@ -134,37 +118,27 @@ def _report(outcome: Outcome, folder: Path) -> None:
     if solution.config.smoke:
         click.echo("SMOKE: a quick check on a coarse mesh; its numbers are not for use.\n")
     notes = spring_notes(metrics, stiffness_ranges(solution)) if solution.converged else ()
-    console, rows = Console(), summary_rows(metrics, solution.status, solution.cost)
-    if console.is_terminal:
-        console.print(summary_renderable(rows, notes))
-    else:
-        click.echo(summary(rows, notes))
+    _echo(summary_rows(metrics, solution.status, solution.cost), notes)
     click.echo()
     if verdict is not None:
         click.echo(f"How sure are the {'numbers' if verdict.numbers else 'springs'}?")
-        _echo_rows(console, verdict_lines(verdict))
+        _echo([*verdict_lines(verdict)], width=20)
         click.echo()
     rows = [*optimum_lines(solution.optima), *detail_lines(solution, metrics)]
     rows += [("bounds", line) for line in source_lines(solution.bounds.sources)]
     rows += [("patient", note) for note in notes_together(solution.walker.patient.notes)]
-    _echo_rows(console, rows)
+    _echo(rows, width=20)
     click.echo(f"\nWritten to {folder}")
 
 
-def _echo_rows(console: Console, rows: Iterable[tuple[str, str]]) -> None:
-    """Print labels and texts; on a terminal, long texts stay in their column."""
-    from rich.table import Table
-    from rich.text import Text
+def _echo(rows: Sequence[tuple[str, str]], notes: Iterable[str] = (), width: int = 0) -> None:
+    """Print labels and texts, those of a terminal in colour."""
+    from rich.console import Console
 
-    rows = list(rows)
-    width = max(20, *(len(label) for label, _ in rows)) if rows else 20
-    if not console.is_terminal:
-        for label, text in rows:
-            click.echo(f"{label:<{width}}  {text}")
-        return
-    table = Table.grid(padding=(0, 2))
-    table.add_column(style="dim", no_wrap=True, width=width)
-    table.add_column()
-    for label, text in rows:
-        table.add_row(label, Text(text))
-    console.print(table)
+    from pathwalker_cli.results.text import summary, summary_renderable
+
+    console = Console()
+    if console.is_terminal:
+        console.print(summary_renderable(rows, notes, width))
+    else:
+        click.echo(summary(rows, notes, width))

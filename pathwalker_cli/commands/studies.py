@@ -56,10 +56,6 @@ class StudyCall:
     def base(self, kind: StudyKind[Any, Any], study: NeighbourStudy) -> Run:
         """Return the run that a study stands on, read or solved now.
 
-        Args:
-            kind: The kind of the study.
-            study: Its config.
-
         Raises:
             ConfigError: If the study cannot take the base; then nothing is solved.
             DataError: If the run cannot be used.
@@ -76,11 +72,7 @@ class StudyCall:
 
 
 def study_command(name: str) -> click.Command:
-    """Return the command of a study, with the options that all studies share.
-
-    Args:
-        name: Its name in `STUDIES`.
-    """
+    """Return the command of a study, with the options that all studies share."""
     entry = STUDIES[name]
     options: tuple[Callable[..., Any], ...] = (
         click.argument("config", metavar="CONFIG", shell_complete=complete_configs),

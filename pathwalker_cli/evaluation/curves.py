@@ -1,40 +1,20 @@
-"""What is drawn over the gait cycle or the stance of a side, and how gaits look in a figure.
-
-Angles, forces, moments and activations have one panel per side.  Flexion, dorsiflexion and forward
-lean are positive angles, as gait laboratories plot them; moments are internal ones, extension and
-plantarflexion positive.
-"""
+"""How gaits look over the gait cycle and the stance of a side, one panel per side."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from pathwalker_cli.conventions import (
-    COORDINATES,
-    GENERATORS,
-    LEG_JOINTS,
-    SUFFIX,
-    Side,
-    to_degrees,
-)
+from pathwalker_cli.conventions import Side, to_degrees
 from pathwalker_cli.evaluation.recorded import RecordedGait
-from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION, Band
-from pathwalker_cli.stride.figures.style import (
-    LINE_COLOUR,
-    LINE_STYLE,
-    NEUTRAL,
-    TEXT,
-    dress,
-    percent_axis,
-    zero_line,
-)
+from pathwalker_cli.stride.figures import style
+from pathwalker_cli.stride.figures.curves import Band, CycleCurve
 from pathwalker_cli.stride.measures import ankle_line
-from pathwalker_cli.stride.stride import POINTS, NotKnownError, Stride
+from pathwalker_cli.stride.stride import POINTS, Stride
 
 FINE: Final = 301
 """Points of computed curves, which are smooth; recorded ones have `POINTS`."""
@@ -68,7 +48,7 @@ class Trace:
     def look(self, side: Side) -> dict[str, Any]:
         """Return colour and line style of its curve."""
         if self.order is None:
-            return {"color": LINE_COLOUR[side], "linestyle": LINE_STYLE[side]}
+            return {"color": style.LINE_COLOUR[side], "linestyle": style.LINE_STYLE[side]}
         colour = _COLOURS[self.order % len(_COLOURS)]
         return {"color": colour, "linestyle": _STYLES[self.order % len(_STYLES)]}
 
@@ -83,7 +63,7 @@ class Trace:
     def edge(self) -> dict[str, Any]:
         """Return the look of the recorded mean, and of the edges of ranges that may overlap."""
         if self.order is None:
-            return {"color": NEUTRAL, "linewidth": 0.7}
+            return {"color": style.NEUTRAL, "linewidth": 0.7}
         return {**self.look("right"), "linewidth": 0.6, "alpha": 0.6}
 
 
@@ -116,47 +96,10 @@ def _printable(label: str) -> str:
     return f" {printable}" if printable.startswith("_") else printable
 
 
-@dataclass(frozen=True)
-class CycleCurve:
-    """A quantity over the gait cycle of a side.
-
-    Args:
-        key: Its name in files.
-        name: Its name for people, e.g. "hip".
-        label: Label of the y axis with its unit.
-        columns: Its columns of a stride in the unit of the label, shape (n, m).
-        midline: Whether it belongs to no side, so that the title names the cycle.
-        zero: Whether zero is of interest.
-        least_in_stance: Whether a dot marks the least value of stance.
-    """
-
-    key: str
-    name: str
-    label: str
-    columns: Callable[[Stride, Side], np.ndarray]
-    midline: bool = False
-    zero: bool = True
-    least_in_stance: bool = False
-
-    def title(self, side: Side) -> str:
-        """Return the title of the panel of a side."""
-        return (
-            f"{self.name}, {side} cycle" if self.midline else f"{side} {self.name}"
-        ).capitalize()
-
-    def lines(self, stride: Stride, side: Side, points: int = FINE) -> np.ndarray:
-        """Return its curves over the cycle of a side, (m, points); none if they are not known."""
-        try:
-            curves = stride.over_cycle(self.columns(stride, side), side, points).T
-        except NotKnownError:
-            return np.empty((0, points))
-        return curves if np.isfinite(curves).all() else np.empty((0, points))
-
-
 def draw_cycle(ax: Axes, curve: CycleCurve, shown: Sequence[Trace], side: Side) -> None:
     """Draw a quantity of one side of every gait over its recorded range, with the toe-offs."""
     if curve.zero:
-        zero_line(ax)
+        style.zero_line(ax)
     for trace in shown:
         if trace.recorded is not None:
             cycles = trace.recorded.of("stride", side)
@@ -165,23 +108,25 @@ def draw_cycle(ax: Axes, curve: CycleCurve, shown: Sequence[Trace], side: Side) 
     percent = np.linspace(0.0, 100.0, FINE)
     for trace in shown:
         look, toe_off = trace.look(side), _toe_off(trace.gait, side)
-        for line in curve.lines(trace.gait, side):
+        for line in curve.lines(trace.gait, side, FINE):
             ax.plot(percent, line, **look)
             if curve.least_in_stance:
                 row = int(np.argmin(line[: np.searchsorted(percent, toe_off)]))
                 ax.plot(percent[row], line[row], "o", color=look["color"], markersize=4.0)
         ax.axvline(toe_off, **(look | {"linewidth": 0.6}))
-    percent_axis(ax)
+    style.percent_axis(ax)
 
 
 def known_curves(curves: Sequence[CycleCurve], shown: Sequence[Trace]) -> tuple[CycleCurve, ...]:
     """Return the quantities that some gait tells."""
-    return tuple(c for c in curves if any(len(c.lines(trace.gait, "right")) for trace in shown))
+    return tuple(
+        c for c in curves if any(len(c.lines(trace.gait, "right", FINE)) for trace in shown)
+    )
 
 
 def dress_cycle(ax: Axes, curve: CycleCurve, side: Side, label: bool) -> None:
     """Give a low panel its title and, if wanted, the label of its y axis in two lines."""
-    dress(ax, curve.title(side), y=curve.label if label else "")
+    style.dress(ax, curve.title(side), y=curve.label if label else "")
     ax.set_xlabel(f"{side} gait cycle [%]")
     ax.locator_params(axis="y", nbins=4)
 
@@ -201,82 +146,15 @@ def _toe_off(gait: Stride, side: Side) -> float:
     return 100.0 * (toe_off - strike) / gait.duration
 
 
-def _angle(joint: str, name: str, label: str) -> CycleCurve:
-    factor = CLINICAL_ANGLE.get(joint, 1.0) * float(to_degrees(1.0))
-    midline = joint not in CLINICAL_ANGLE
-
-    def columns(stride: Stride, side: Side) -> np.ndarray:
-        return factor * stride.column(joint if midline else f"{joint}_{SUFFIX[side]}")[:, None]
-
-    knee = joint == "knee"  # it is never straight
-    return CycleCurve(f"angle_{joint}", name, label, columns, midline, not knee, knee)
-
-
-def _force(key: str, axis: int, name: str) -> CycleCurve:
-    def columns(stride: Stride, side: Side) -> np.ndarray:
-        return 100.0 / stride.walker.weight * stride.foot_force(side)[:, [axis]]
-
-    return CycleCurve(key, name, "force [% body weight]", columns)
-
-
-def _moment(joint: str, label: str) -> CycleCurve:
-    def columns(stride: Stride, side: Side) -> np.ndarray:
-        torque = stride.known("net_torque")[:, [COORDINATES.index(f"{joint}_{SUFFIX[side]}")]]
-        return EXTENSION[joint] / stride.walker.total_mass * torque
-
-    return CycleCurve(f"moment_{joint}", f"{joint} moment", label, columns)
-
-
-def _activation(joint: str, up: str, down: str) -> CycleCurve:
-    """Return the activation of an antagonistic pair: one upward, the other downward."""
-    midline = joint not in LEG_JOINTS
-
-    def columns(stride: Stride, side: Side) -> np.ndarray:
-        suffix = "" if midline else f"_{SUFFIX[side]}"
-        rows = [GENERATORS.index(f"{joint}_{way}{suffix}") for way in (up, down)]
-        return np.array([1.0, -1.0]) * stride.known("activation")[:, rows]
-
-    name, ways = ("trunk", "ext. +, bend -") if midline else (joint, "ext. +, flex. -")
-    return CycleCurve(f"activation_{joint}", f"{name} muscles", f"{ways} [1]", columns, midline)
-
-
-ANGLES: Final = (
-    _angle("pelvis_tilt", "pelvis", "forward tilt [deg]"),
-    _angle("hip", "hip", "flexion [deg]"),
-    _angle("knee", "knee", "flexion [deg]"),
-    _angle("ankle", "ankle", "dorsiflexion [deg]"),
-    _angle("lumbar", "trunk", "forward lean [deg]"),
-)
-FORCES: Final = (
-    _force("force_vertical", 1, "vertical force"),
-    _force("force_forward", 0, "fore-aft force"),
-)
-MOMENTS: Final = (
-    _moment("hip", "extension [N m/kg]"),
-    _moment("knee", "extension [N m/kg]"),
-    _moment("ankle", "plantarflexion [N m/kg]"),
-)
-# `lumbar_flexion` extends the trunk, see `conventions.GENERATORS`.
-ACTIVATIONS: Final = (
-    *(_activation(joint, "extension", "flexion") for joint in LEG_JOINTS),
-    _activation("lumbar", "flexion", "extension"),
-)
-
-
 def draw_ankle(ax: Axes, shown: Sequence[Trace], side: Side) -> None:
     """Draw the profiles of one ankle: recorded ones, each gait's own, the line of its mean slope.
 
     Dorsiflexion is positive, and so is the plantarflexing torque of muscles and orthosis.
 
-    Args:
-        ax: The panel.
-        shown: The gaits.
-        side: The side.
-
     Raises:
         NotKnownError: If the torques of a gait are not known.
     """
-    zero_line(ax)
+    style.zero_line(ax)
     for trace in shown:
         _draw_recorded_profiles(ax, trace, side)
     ax.margins(y=0.08 * (2 + len(shown)))  # room for the slopes above the curves
@@ -286,7 +164,7 @@ def draw_ankle(ax: Axes, shown: Sequence[Trace], side: Side) -> None:
         ax.annotate(
             text if alone else f"{slope:.0f} N m/rad",
             (0.03, 0.97),
-            (0, -1.3 * TEXT * i),
+            (0, -1.3 * style.TEXT * i),
             xycoords="axes fraction",
             textcoords="offset points",
             va="top",
@@ -304,7 +182,7 @@ def _draw_recorded_profiles(ax: Axes, trace: Trace, side: Side) -> None:
         ax.plot(to_degrees(each[:, 0]), each[:, 1], **look)
     if alone and len(profiles):
         mean = profiles.mean(axis=0)
-        ax.plot(to_degrees(mean[:, 0]), mean[:, 1], color=NEUTRAL, linewidth=1.1)
+        ax.plot(to_degrees(mean[:, 0]), mean[:, 1], color=style.NEUTRAL, linewidth=1.1)
 
 
 def _draw_profile(ax: Axes, trace: Trace, side: Side) -> float:

@@ -66,11 +66,7 @@ def rms_one_trial(stride: Stride, reference: Stride) -> dict[str, float]:
     As the article's program: right and left pooled, the end of the recorded stride left out, and
     the last posture standing for instants after the end of the gait.  It takes the nearest instant
     of its dense output; between instants further apart than a millisecond the angles are
-    interpolated.
-
-    Args:
-        stride: The stride.
-        reference: The recorded stride, from `recorded.reference_stride`.
+    interpolated.  The recorded stride comes from `recorded.reference_stride`.
     """
     at, time = reference.time[:-_CUT], stride.time
     if np.diff(time).max() <= _DENSE:
@@ -120,10 +116,6 @@ def recorded_rms_mean_cycle(recorded: RecordedGait) -> dict[str, Spread]:
 
 def force_rms(stride: Stride, recorded: RecordedGait) -> dict[str, float]:
     """Return the RMS differences to the mean measured force [N], right and left pooled.
-
-    Args:
-        stride: The stride.
-        recorded: The recordings.
 
     Returns:
         The keys of `FORCE_RMS`; without those of which a side was not measured.

@@ -86,6 +86,11 @@ class Change:
         """The change; negative: less with orthoses."""
         return self.orthosis - self.barefoot
 
+    @property
+    def percent(self) -> str:
+        """The change over the barefoot value [%], with its sign; "" where that is zero."""
+        return f"{100.0 * self.value / self.barefoot:+.0f}" if self.barefoot else ""
+
 
 @dataclass(frozen=True)
 class Evaluation:
@@ -138,7 +143,11 @@ def evaluate_gait(
     spreads: dict[str, Spread] = {}
     notes = gait.notes
     if recorded is None:
-        notes += (_nothing_recorded(gait),)
+        notes += (
+            f"patient {gait.walker.patient.id} has no {gait.walker.condition} recordings beside "
+            "its file: joint angles, ground forces, ankle torques, steps and times are not "
+            "compared",
+        )
     else:
         spreads = recorded_numbers(recorded)
         for more, recorded_too, note in _differences(gait, recorded, reference):
@@ -162,12 +171,7 @@ def compared() -> tuple[Measure, ...]:
 
 
 def gait_changes(barefoot: Evaluation, orthosis: Evaluation) -> tuple[Change, ...]:
-    """Return the changes from barefoot to orthosis of what both gaits tell.
-
-    Args:
-        barefoot: A gait barefoot.
-        orthosis: A gait of the same patient with orthoses.
-    """
+    """Return the changes from barefoot to orthosis of what both gaits tell."""
     article = barefoot.gait.walker.patient.id == PATIENT
     before = {row.measure.key: row for row in barefoot.rows}
     after = {row.measure.key: row for row in orthosis.rows}
@@ -187,15 +191,6 @@ def gait_changes(barefoot: Evaluation, orthosis: Evaluation) -> tuple[Change, ..
 
 Found = tuple[dict[str, float], dict[str, Spread], tuple[str, ...]]
 """Differences of the gait and of single recorded strides by key, and notes."""
-
-
-def _nothing_recorded(gait: Stride) -> str:
-    """Return the note that there are no recordings."""
-    walker = gait.walker
-    return (
-        f"patient {walker.patient.id} has no {walker.condition} recordings beside its file: joint "
-        "angles, ground forces, ankle torques, steps and times are not compared"
-    )
 
 
 def _differences(gait: Stride, recorded: RecordedGait, reference: Stride | None) -> Iterator[Found]:

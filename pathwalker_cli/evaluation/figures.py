@@ -5,34 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import matplotlib as mpl
+from matplotlib.artist import Artist
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.evaluation.curves import (
-    ACTIVATIONS,
-    ANGLES,
-    FORCES,
-    MOMENTS,
-    CycleCurve,
     Trace,
     draw_ankle,
     draw_cycle,
     dress_cycle,
     known_curves,
 )
+from pathwalker_cli.stride.figures import style
+from pathwalker_cli.stride.figures.curves import ACTIVATIONS, ANGLES, FORCES, MOMENTS, CycleCurve
 from pathwalker_cli.stride.figures.save import save_formats
-from pathwalker_cli.stride.figures.style import (
-    NEUTRAL,
-    STYLE,
-    dress,
-    legend,
-    new_figure,
-)
 
 PAIR_HEIGHT: Final = 1.15
 """Height of a row of two panels in a column [in]."""
@@ -48,7 +38,7 @@ def cycle_figure(trace: Trace, curves: Sequence[CycleCurve]) -> Figure:
     dot = "least knee flexion" if any(curve.least_in_stance for curve in curves) else ""
     handles = legend_handles([trace], dot)
     fig = cycle_pairs(curves, [trace], _head(len(handles)))
-    legend(fig, handles)
+    style.legend(fig, handles)
     return fig
 
 
@@ -60,10 +50,10 @@ def ankle_figure(trace: Trace) -> Figure:
     """
     handles = [*_trace_handles([trace]), *_ankle_handles()]
     if trace.recorded is not None:
-        handles.append(Line2D([], [], color="#999999", linewidth=0.5, label="recorded stances"))
-        handles.append(Line2D([], [], color=NEUTRAL, linewidth=1.1, label="their mean"))
+        handles.append(style.entry("recorded stances", color="#999999", linewidth=0.5))
+        handles.append(style.entry("their mean", linewidth=1.1))
     fig = ankle_pair([trace], _head(len(handles)))
-    legend(fig, handles)
+    style.legend(fig, handles)
     return fig
 
 
@@ -75,7 +65,7 @@ def cycle_pairs(curves: Sequence[CycleCurve], shown: Sequence[Trace], head: floa
         shown: The gaits.
         head: Height to keep for a legend [in].
     """
-    fig = new_figure(head + PAIR_HEIGHT * len(curves))
+    fig = style.new_figure(head + PAIR_HEIGHT * len(curves))
     panels = fig.subplots(len(curves), 2, sharey="row", squeeze=False)
     for row, curve in zip(panels, curves, strict=True):
         for ax, side in zip(row, SIDES, strict=True):
@@ -91,22 +81,17 @@ def ankle_pair(shown: Sequence[Trace], head: float = 0.0) -> Figure:
         shown: The gaits.
         head: Height to keep for a legend [in].
     """
-    fig = new_figure(head + ANKLE_HEIGHT)
+    fig = style.new_figure(head + ANKLE_HEIGHT)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
     for ax, side in zip(panels, SIDES, strict=True):
         draw_ankle(ax, shown, side)
         label = "net plantarflexing torque [N m]" if side == "right" else ""
-        dress(ax, f"{side.capitalize()} ankle in stance", "dorsiflexion [deg]", label)
+        style.dress(ax, f"{side.capitalize()} ankle in stance", "dorsiflexion [deg]", label)
     return fig
 
 
 def save_evaluation_figures(trace: Trace, folder: str | Path) -> tuple[str, ...]:
-    """Save the figures that a gait allows as PNG and SVG; return the file names.
-
-    Args:
-        trace: The gait over its recordings.
-        folder: Where; made if it does not exist.
-    """
+    """Save the figures that a gait allows as PNG and SVG; return the file names."""
     makers: dict[str, Callable[[], Figure]] = {
         name: partial(cycle_figure, trace, curves)
         for name, curves in {"joint_angles": ANGLES, "ground_forces": FORCES}.items()
@@ -118,12 +103,7 @@ def save_evaluation_figures(trace: Trace, folder: str | Path) -> tuple[str, ...]
 
 
 def save_overlays(shown: Sequence[Trace], folder: str | Path) -> tuple[str, ...]:
-    """Save figures of several gaits over one another as PNG and SVG; return the file names.
-
-    Args:
-        shown: The gaits.
-        folder: Where; made if it does not exist.
-    """
+    """Save figures of several gaits over one another as PNG and SVG; return the file names."""
     head = 0.18 * len(shown) + 0.1
     groups = {
         "joint_angles": ANGLES,
@@ -142,7 +122,7 @@ def save_overlays(shown: Sequence[Trace], folder: str | Path) -> tuple[str, ...]
     def dressed(name: str) -> Figure:
         figure = makers[name]()
         extra = _ankle_handles()[:1] if name == "ankle_torque" else []
-        legend(figure, [*_trace_handles(shown), *extra], columns=1 + (len(shown) > 3))
+        style.legend(figure, [*_trace_handles(shown), *extra], columns=1 + (len(shown) > 3))
         return figure
 
     return _saved({name: partial(dressed, name) for name in makers}, folder)
@@ -152,18 +132,18 @@ def _saved(makers: Mapping[str, Callable[[], Figure]], folder: str | Path) -> tu
     """Save figures as PNG and SVG; return the file names."""
     saved: list[str] = []
     for name, make in makers.items():
-        with mpl.rc_context(STYLE):
+        with mpl.rc_context(style.STYLE):
             figure = make()
         saved += save_formats(figure, folder, name)
     return tuple(saved)
 
 
-def legend_handles(shown: Sequence[Trace], dot: str = "") -> list[Any]:
+def legend_handles(shown: Sequence[Trace], dot: str = "") -> list[Artist]:
     """Return the entries of a legend: gaits, a dot if there is one, toe-offs, recorded range."""
-    handles: list[Any] = _trace_handles(shown)
+    handles: list[Artist] = _trace_handles(shown)
     if dot:
         handles.append(_dot(dot))
-    handles.append(Line2D([], [], color=NEUTRAL, linewidth=0.6, label="upright: toe-off"))
+    handles.append(style.events_handle())
     if len(shown) == 1 and shown[0].recorded is not None:
         handles.append(Patch(facecolor="#cccccc", label="recorded: range, mean"))
     handles += [
@@ -179,19 +159,19 @@ def _head(entries: int) -> float:
     return 0.15 * ((entries + 1) // 2) + 0.1
 
 
-def _trace_handles(shown: Sequence[Trace]) -> list[Any]:
+def _trace_handles(shown: Sequence[Trace]) -> list[Artist]:
     """Return the entries of the gaits: of one both sides, of several one each."""
     if len(shown) > 1 or shown[0].order is not None:
-        return [Line2D([], [], label=trace.label, **trace.look("right")) for trace in shown]
+        return [style.entry(trace.label, **trace.look("right")) for trace in shown]
     names: dict[Side, str] = {"right": f"{shown[0].label}: right", "left": "left"}
-    return [Line2D([], [], label=names[side], **shown[0].look(side)) for side in SIDES]
+    return [style.entry(names[side], **shown[0].look(side)) for side in SIDES]
 
 
-def _ankle_handles() -> list[Any]:
+def _ankle_handles() -> list[Artist]:
     """Return the entries of what only the ankle's profile shows."""
-    slope = Line2D([], [], color="black", linewidth=0.9, linestyle=":", label="its mean slope")
+    slope = style.entry("its mean slope", color="black", linewidth=0.9, linestyle=":")
     return [_dot("foot strike"), slope]
 
 
-def _dot(label: str) -> Line2D:
-    return Line2D([], [], color=NEUTRAL, marker="o", markersize=4, linestyle="", label=label)
+def _dot(label: str) -> Artist:
+    return style.entry(label, marker="o", markersize=4, linestyle="")

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured
 
 from pathwalker_cli.conventions import GRAVITY, SIDES
-from pathwalker_cli.evaluation.curves import ANGLES, MOMENTS
 from pathwalker_cli.paths import shipped
+from pathwalker_cli.stride.figures.curves import ANGLES, MOMENTS
 from pathwalker_cli.stride.stride import Stride
 
 CLASSES: Final = (

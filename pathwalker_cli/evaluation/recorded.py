@@ -29,14 +29,7 @@ Position = Literal["below", "in", "above"]
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean and range over trials, strides or stances.
-
-    Args:
-        mean: Mean.
-        low: Smallest value.
-        high: Largest value.
-        count: Number of values.
-    """
+    """Mean and range over trials, strides or stances, and their number."""
 
     mean: float
     low: float

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from itertools import count
 from pathlib import Path
 
-from pathwalker_cli.errors import DataError, NotConvergedError
-from pathwalker_cli.model.contact import PHASE_NAMES
-from pathwalker_cli.results.run_folder import Run, load_run
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.results.run_folder import Run, load_converged
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import Stride, stride_of
 
@@ -42,26 +41,11 @@ def run_names(folders: Sequence[Path]) -> tuple[str, ...]:
 def stride_of_run(folder: str | Path) -> tuple[Run, GaitSeries]:
     """Return a converged run and its time series.
 
-    Args:
-        folder: The folder that `pathwalker solve` wrote.
-
     Raises:
         DataError: If it is no run folder, did not converge or holds no full stride.
         PatientError: If the patient that it keeps is damaged.
     """
-    try:
-        run = load_run(folder)
-    except NotConvergedError as error:
-        raise DataError(
-            str(error), allowed="a converged run", mend="solve it again first"
-        ) from None
-    names = tuple(phase.name for phase in run.motion.phases)
-    if names != PHASE_NAMES:
-        raise DataError(
-            f"holds the phases {', '.join(names)}",
-            where=str(folder),
-            allowed="a stride of both legs in eight phases",
-        )
+    run = load_converged(folder, mend="solve it again first")
     return run, gait_series(run.case.walker(), run.motion)
 
 
@@ -72,9 +56,6 @@ def run_notes(run: Run) -> tuple[str, ...]:
 
 def gait_of_run(folder: str | Path) -> Stride:
     """Return the gait of a converged run.
-
-    Args:
-        folder: The folder that `pathwalker solve` wrote.
 
     Raises:
         DataError: If it is no run folder, did not converge or holds no full stride.

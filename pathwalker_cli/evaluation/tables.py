@@ -42,11 +42,10 @@ def change_lines(changes: Sequence[Change]) -> Iterator[str]:
         yield section
         for row in rows:
             measure = row.measure
-            share = f"{100.0 * row.value / row.barefoot:+.0f}" if row.barefoot else ""
             yield _change_line(
                 measure.row, measure.text(row.barefoot), measure.text(row.orthosis),
-                measure.text(row.value, sign=True), share, measure.text(row.recorded, sign=True),
-                str(row.paper or ""), measure.shown_unit,
+                measure.text(row.value, sign=True), row.percent,
+                measure.text(row.recorded, sign=True), str(row.paper or ""), measure.shown_unit,
             )  # fmt: skip
 
 
@@ -106,12 +105,7 @@ def spread_text(values: Spread | None, measure: Measure) -> str:
 def evaluation_content(
     evaluations: Sequence[Evaluation], changes: Sequence[Change] = ()
 ) -> dict[str, Any]:
-    """Return everything that was evaluated, ready for JSON.
-
-    Args:
-        evaluations: One or more gaits beside the recordings.
-        changes: Changes from barefoot to orthosis.
-    """
+    """Return everything that was evaluated, ready for JSON."""
     return {
         "runs": [_run(each) for each in evaluations],
         "changes": {change.measure.key: _change(change) for change in changes},

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Iterator, Sequence
+from typing import Final
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.config.values import changed_values, value_text
@@ -27,9 +27,8 @@ _HASH: Final = 12
 
 def assumption_section(runs: Sequence[ReportRun]) -> Section:
     """Return what was assumed and what was reached, a column per run."""
-    columns = [dict(_facts(run)) for run in runs]
-    labels = dict.fromkeys(label for column in columns for label in column)
-    rows = tuple((label, *(column.get(label, "-") for column in columns)) for label in labels)
+    columns = [_facts(run) for run in runs]
+    rows = tuple((label, *(column[label] for column in columns)) for label in columns[0])
     head = ("", *(run.label for run in runs))
     return Section("What was assumed, and what was reached", tables=(fact_table(rows, head),))
 
@@ -48,73 +47,38 @@ def _aim(config: StudyConfig) -> str:
     return ", ".join(aims)
 
 
-def _facts(run: ReportRun) -> Iterator[tuple[str, str]]:
-    """Yield label and sentence."""
-    metrics, config = run.run.metrics, run.run.config
-    walker = run.evaluation.gait.walker
-    quirks = ", with the quirks of the published model" if metrics.get("published_model") else ""
-    yield (
-        "Model",
-        (
-            f"flat rigid-body walker of {walker.total_mass:.1f} kg in all with 14 muscle torque "
-            f"generators, two contact points per foot; dynamics back end "
-            f"{_text(metrics, 'dynamics_backend')}{quirks}; assumed aim: {_aim(config)}"
-        ),
-    )
-    notes = metrics.get("notes") or []
-    yield (
-        "Mass, strengths",
-        ". ".join(
-            [
-                f"body mass {run.patient.body_mass:g} kg and strengths from the patient's file",
-                *notes_together([*map(str, notes)]),
-            ]
-        ),
-    )
-    yield "Active bounds", "; ".join(_bounds(run.run.result)) or "none that shapes the gait"
-    worst = _in_words(_text(metrics, "largest_violation_name"))
-    yield (
-        "Tolerances",
-        (
-            f"optimality {config.solver.tolerance:g}, constraints "
-            f"{config.solver.constraint_tolerance:g}; reached: largest violation "
-            f"{_short(metrics, 'largest_violation')} ({worst})"
-        ),
-    )
-    yield (
-        "Re-integration",
-        (
-            "an independent integrator misses the next node by at most "
-            f"{_short(metrics, 'reintegration_position_error')} rad or m and "
-            f"{_short(metrics, 'reintegration_velocity_error')} rad/s or m/s (asked for: "
-            f"{config.mesh.position_tolerance:g}, {config.mesh.velocity_tolerance:g})"
-        ),
-    )
-    yield (
-        "Second engine",
-        (
-            "numeric Pinocchio meets the equations of motion within "
-            f"{_short(metrics, 'second_engine_residual')} N or N m"
-        ),
-    )
-    yield (
-        "Mesh, iterations",
-        (
-            f"{_METHODS.get(config.transcription, config.transcription)}, "
-            f"{_text(metrics, 'intervals')} intervals, {_text(metrics, 'iterations')} iterations; "
-            f"start: {_text(metrics, 'start')}; cost {_short(metrics, 'cost', '.5g')}"
-        ),
-    )
-    versions = metrics.get("versions") or {}
-    yield "Versions", ", ".join(f"{name} {number}" for name, number in versions.items())
-    hashes = metrics.get("input_hashes") or {}
-    yield "Inputs", ", ".join(f"{name} {str(h)[:_HASH]}" for name, h in hashes.items())
-    changed = changed_values(config)
-    yield (
-        "Config",
-        "; ".join(f"{key} = {value_text(now)}" for key, (now, _) in changed.items())
-        or "all defaults",
-    )
+def _facts(run: ReportRun) -> dict[str, str]:
+    """Return a sentence by label."""
+    result, config = run.run.result, run.run.config
+    walker, mesh, solver = run.evaluation.gait.walker, config.mesh, config.solver
+    quirks = ", with the quirks of the published model" if result.published_model else ""
+    return {
+        "Model": f"flat rigid-body walker of {walker.total_mass:.1f} kg in all with 14 muscle "
+        "torque generators, two contact points per foot; dynamics back end "
+        f"{_text(result.dynamics_backend)}{quirks}; assumed aim: {_aim(config)}",
+        "Mass, strengths": ". ".join([
+            f"body mass {run.patient.body_mass:g} kg and strengths from the patient's file",
+            *notes_together(result.notes or []),
+        ]),
+        "Active bounds": "; ".join(_bounds(result)) or "none that shapes the gait",
+        "Tolerances": f"optimality {solver.tolerance:g}, constraints "
+        f"{solver.constraint_tolerance:g}; reached: largest violation "
+        f"{_short(result.largest_violation)} ({_in_words(_text(result.largest_violation_name))})",
+        "Re-integration": "an independent integrator misses the next node by at most "
+        f"{_short(result.reintegration_position_error)} rad or m and "
+        f"{_short(result.reintegration_velocity_error)} rad/s or m/s (asked for: "
+        f"{mesh.position_tolerance:g}, {mesh.velocity_tolerance:g})",
+        "Second engine": "numeric Pinocchio meets the equations of motion within "
+        f"{_short(result.second_engine_residual)} N or N m",
+        "Mesh, iterations": f"{_METHODS.get(config.transcription, config.transcription)}, "
+        f"{_text(result.intervals)} intervals, {_text(result.iterations)} iterations; "
+        f"start: {_text(result.start)}; cost {_short(result.cost, '.5g')}",
+        "Versions": ", ".join(f"{name} {number}" for name, number in result.versions.items()),
+        "Inputs": ", ".join(f"{n} {str(h)[:_HASH]}" for n, h in result.input_hashes.items()),
+        "Config": "; ".join(
+            f"{key} = {value_text(now)}" for key, (now, _) in changed_values(config).items()
+        ) or "all defaults",
+    }  # fmt: skip
 
 
 def _bounds(result: RunMetrics) -> Iterator[str]:
@@ -135,12 +99,9 @@ def _in_words(text: str) -> str:
     return _TWO_FEET.sub(r"\1 \2 with \3 \4", text).replace("_", " ")
 
 
-def _short(metrics: Mapping[str, Any], key: str, form: str = ".1e") -> str:
-    """Return a number of the metrics, "unknown" if it is none."""
-    value = metrics.get(key)
-    return format(value, form) if isinstance(value, int | float) else "unknown"
+def _short(value: float | None, form: str = ".1e") -> str:
+    return "unknown" if value is None else format(value, form)
 
 
-def _text(metrics: Mapping[str, Any], key: str) -> str:
-    value = metrics.get(key)
+def _text(value: object) -> str:
     return "unknown" if value is None else str(value)

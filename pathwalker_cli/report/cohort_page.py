@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -39,8 +39,7 @@ def cohort_page(folders: Sequence[Path]) -> Page:
     )
     answer = f"{counts['Converged']} of {len(rows)} cases of {len(patients)} patients converged."
     sections = tuple(_section(folder, own) for folder, own in tables.items())
-    warnings = [*_warnings(counts), *_quick_checks(tables)]
-    return Page("Cohort", facts, answer, tuple(warnings), sections)
+    return Page("Cohort", facts, answer, tuple(_warnings(counts, tables)), sections)
 
 
 def _counts(rows: Rows) -> dict[str, int]:
@@ -50,26 +49,16 @@ def _counts(rows: Rows) -> dict[str, int]:
     return {"Converged": done, "Failed": len(rows) - done - waiting, "Not yet run": waiting}
 
 
-def _warnings(counts: Mapping[str, int]) -> list[str]:
-    warnings = []
+def _warnings(counts: Mapping[str, int], tables: Mapping[Path, Rows]) -> Iterator[str]:
+    """Yield what must be known before the table is used."""
     if counts["Failed"]:
-        warnings.append(f"{counts['Failed']} cases failed: they have no gait and no springs")
+        yield f"{counts['Failed']} cases failed: they have no gait and no springs"
     if counts["Not yet run"]:
-        warnings.append(f"{counts['Not yet run']} cases have not been run yet")
-    return warnings
-
-
-def _quick_checks(tables: Mapping[Path, Rows]) -> list[str]:
-    """Return a warning if cases are quick checks."""
-    quick = [
-        metrics
-        for folder, rows in tables.items()
-        for row in rows
-        if (metrics := read_metrics(folder / CASES / row["case"])) and metrics.get("smoke")
-    ]
-    if not quick:
-        return []
-    return [f"{len(quick)} cases are quick checks on coarse meshes: numbers for orientation only"]
+        yield f"{counts['Not yet run']} cases have not been run yet"
+    cases = [folder / CASES / row["case"] for folder, rows in tables.items() for row in rows]
+    quick = sum(bool((read_metrics(case) or {}).get("smoke")) for case in cases)
+    if quick:
+        yield f"{quick} cases are quick checks on coarse meshes: numbers for orientation only"
 
 
 def _section(folder: Path, rows: Rows) -> Section:

@@ -213,31 +213,18 @@ def write_comparison_csv(path: Path, found: Comparison) -> None:
     header = ["metric", "unit", *names]
     header += [f"{name} - {names[0]}" for name in names[1:]]
     header += [f"{name} - {names[0]} [%]" for name in names[1:]]
-    rows = (
-        [
-            row.measure.key,
-            row.measure.unit,
-            *row.values,
-            *row.differences[1:],
-            *(None if share is None else 100.0 * share for share in row.shares[1:]),
-        ]
-        for row in found.rows
-    )
+    rows = []
+    for row in found.rows:
+        percent = (None if share is None else 100.0 * share for share in row.shares[1:])
+        about = row.measure.key, row.measure.unit
+        rows.append([*about, *row.values, *row.differences[1:], *percent])
     write_table(path, header, rows)
 
 
 def comparison_content(found: Comparison) -> dict[str, Any]:
     """Return everything that was compared, ready for JSON; SI units, shares of 1."""
     return {
-        "runs": [
-            {
-                "name": gait.name,
-                "problem": gait.problem,
-                "patient": gait.walker.patient.id,
-                "condition": gait.walker.condition,
-            }
-            for gait in found.gaits
-        ],
+        "runs": [_about(gait) for gait in found.gaits],
         "base": found.names[0],
         "metrics": {
             row.measure.key: {
@@ -253,3 +240,9 @@ def comparison_content(found: Comparison) -> dict[str, Any]:
         },
         "notes": list(found.notes),
     }
+
+
+def _about(gait: Stride) -> dict[str, str]:
+    walker = gait.walker
+    return {"name": gait.name, "problem": gait.problem, "patient": walker.patient.id,
+            "condition": walker.condition}  # fmt: skip

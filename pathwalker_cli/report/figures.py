@@ -7,30 +7,15 @@ from collections.abc import Callable, Sequence
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from pathwalker_cli.evaluation.curves import (
-    ACTIVATIONS,
-    ANGLES,
-    FORCES,
-    MOMENTS,
-    CycleCurve,
-    Trace,
-    known_curves,
-    traces,
-)
+from pathwalker_cli.evaluation.curves import Trace, known_curves, traces
 from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_handles
 from pathwalker_cli.inverse.figures import joint_torque_figure, name_figure
 from pathwalker_cli.inverse.trials import Trial
-from pathwalker_cli.patient.blocks import SpringSet
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
-from pathwalker_cli.report.study_files import Spreads
+from pathwalker_cli.stride.figures.curves import ACTIVATIONS, ANGLES, FORCES, MOMENTS, CycleCurve
 from pathwalker_cli.stride.figures.inline import inline_svg
 from pathwalker_cli.stride.figures.style import STYLE, legend, new_figure
-from pathwalker_cli.studies.landscape.figures import Chosen, cost_figure
-from pathwalker_cli.studies.landscape.result import Landscape
-from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure
-from pathwalker_cli.studies.tradeoff.result import Tradeoff
-from pathwalker_cli.studies.uncertainty.figures import spread_figure
 
 
 def curve_section(runs: Sequence[ReportRun]) -> Section:
@@ -39,7 +24,7 @@ def curve_section(runs: Sequence[ReportRun]) -> Section:
     names = " and ".join(trace.label for trace in shown)
     drawings = [
         *(_cycle(curve, shown, names) for curve in (*ANGLES, *FORCES, *MOMENTS)),
-        _drawn(
+        drawn(
             lambda: ankle_pair(shown),
             "ankle-torque",
             f"Net ankle torque [N m] over dorsiflexion [deg] in stance, right and left: {names}",
@@ -57,48 +42,14 @@ def curve_section(runs: Sequence[ReportRun]) -> Section:
 
 
 def torque_drawing(trials: Sequence[Trial], body_mass: float, name: str, title: str) -> Drawing:
-    """Return the recorded joint torques of one condition.
-
-    Args:
-        trials: Trials of one condition.
-        body_mass: Mass of the patient [kg].
-        name: A name that no other figure of the page has.
-        title: What it shows.
-    """
+    """Return the recorded joint torques of one condition over body mass [kg]; see `drawn`."""
 
     def draw() -> Figure:
         figure = joint_torque_figure(trials, body_mass)
         name_figure(figure, f"{trials[0].condition}, {len(trials)} trials")
         return figure
 
-    return _drawn(draw, name, title, "tall")
-
-
-def landscape_drawing(landscape: Landscape, springs: SpringSet | None, chosen: Chosen) -> Drawing:
-    """Return the cost over the springs of a side.
-
-    Args:
-        landscape: The landscape.
-        springs: Springs that exist, or None.
-        chosen: K_D and K_P of the springs to take by side [N m/rad].
-    """
-    title = "Cost above the least [%] over K_D and K_P [N m/rad]"
-    return _drawn(lambda: cost_figure(landscape, springs, chosen), "landscape", title, "tall")
-
-
-def tradeoff_drawing(tradeoff: Tradeoff) -> Drawing:
-    """Return effort over speed, and the springs along the front."""
-    title = "Effort per distance [s/m] and springs [N m/rad] over walking speed [m/s]"
-    return _drawn(lambda: tradeoff_figure(tradeoff), "tradeoff", title, "tall")
-
-
-def spread_drawing(spreads: Spreads) -> Drawing:
-    """Return where springs, cost and gait of all draws end up."""
-    title = "Springs of all draws [N m/rad], and deviation of cost and gait from the base [%]"
-    return _drawn(
-        lambda: spread_figure(spreads.values, spreads.ranges, spreads.spreads),
-        "uncertainty", title, "tall",
-    )  # fmt: skip
+    return drawn(draw, name, title, "tall")
 
 
 def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
@@ -114,7 +65,7 @@ def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
 def _cycle(curve: CycleCurve, shown: Sequence[Trace], names: str) -> Drawing:
     """Return a quantity of both sides over the gait cycle."""
     title = f"{curve.name}, {curve.label} over the gait cycle, right and left: {names}"
-    return _drawn(lambda: cycle_pairs([curve], shown), curve.key.replace("_", "-"), title)
+    return drawn(lambda: cycle_pairs([curve], shown), curve.key.replace("_", "-"), title)
 
 
 def _legend(shown: Sequence[Trace]) -> Drawing:
@@ -126,11 +77,18 @@ def _legend(shown: Sequence[Trace]) -> Drawing:
         legend(figure, handles)
         return figure
 
-    return _drawn(draw, "legend", "Legend of the curves")
+    return drawn(draw, "legend", "Legend of the curves")
 
 
-def _drawn(draw: Callable[[], Figure], name: str, title: str, shape: Shape = "pair") -> Drawing:
-    """Return a figure as it stands on the page."""
+def drawn(draw: Callable[[], Figure], name: str, title: str, shape: Shape = "pair") -> Drawing:
+    """Return a figure as it stands on the page.
+
+    Args:
+        draw: Makes the figure.
+        name: A name that no other figure of the page has; letters, digits and "-".
+        title: What it shows, in words.
+        shape: "tall" if it is at least twice as high as a row of panels.
+    """
     with mpl.rc_context(STYLE):
         figure = draw()
     return Drawing(inline_svg(figure, name, title[:1].upper() + title[1:]), shape)

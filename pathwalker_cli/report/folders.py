@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from pydantic import BaseModel
+
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.io.yaml_file import validate
@@ -45,11 +47,13 @@ class Study:
         folder: Its folder.
         kind: Which command made it.
         content: Its summary.
+        summary: The same, typed: a member of `SUMMARIES`.
     """
 
     folder: Path
     kind: Kind
     content: Mapping[str, Any]
+    summary: BaseModel
 
     @property
     def optimum(self) -> Mapping[str, Any]:
@@ -158,15 +162,11 @@ def studies_near(
 
 
 def _study(folder: Path, kind: Kind) -> Study:
-    """Read the summary of a study.
-
-    Raises:
-        DataError: If it cannot be read, or is not what the command writes.
-    """
+    """Read the summary of a study."""
     path = folder / STUDIES[kind]
     content = read_json(path, mend="make the study again")
-    validate(content, SUMMARIES.get(kind, Summary), where=str(path), error=DataError)
-    return Study(folder, kind, content)
+    model = SUMMARIES.get(kind, Summary)
+    return Study(folder, kind, content, validate(content, model, where=str(path), error=DataError))
 
 
 def _near_folders(folder: Path) -> list[tuple[Kind, Path]]:

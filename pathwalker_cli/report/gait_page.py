@@ -20,12 +20,7 @@ from pathwalker_cli.studies.verdict import snapped_warning
 
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
-    """Return the page about the runs of one patient.
-
-    Args:
-        runs: The runs, barefoot ones first.
-        studies: Studies around one of them.
-    """
+    """Return the page about runs of one patient, barefoot ones first, with studies around them."""
     patient, changes = runs[0].patient, changes_of(runs)
     with_orthoses = [run for run in runs if run.worn]
     sections = [spring_section(run) for run in with_orthoses]
@@ -74,8 +69,8 @@ def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
     saved = ""
     if effort is not None:
         values = [effort.measure.text(v) for v in (effort.barefoot, effort.orthosis)]
-        share = 100.0 * effort.value / effort.barefoot
-        saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot ({share:+.0f} %)"
+        saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot"
+        saved += f" ({effort.percent} %)"
     real = run.verdict is not None and run.verdict.snapped is not None
     kind = "Springs to take" if real else "Springs found"
     if all(prescribed(run, name) for name in STIFFNESSES):
@@ -129,12 +124,7 @@ def _coarse(run: ReportRun) -> bool:
 
 
 def gait_section(runs: Sequence[ReportRun], changes: Sequence[Change]) -> Section:
-    """Return the table of steps, times, crouch, forces and effort.
-
-    Args:
-        runs: The runs.
-        changes: From barefoot to orthosis; none where there are not both.
-    """
+    """Return the table of steps, times, crouch, forces and effort."""
     head, columns = ["", "unit"], "ww"
     for run in runs:
         head += [run.label, *(["recorded, mean [min, max]", "is"] if _compared(run) else [])]
@@ -170,16 +160,8 @@ def _row(measure: Measure, runs: Sequence[ReportRun], changes: Sequence[Change])
             cells.append(spread_text(row.recorded if row else None, measure))
             cells.append((row.position or "") if row else "")
     if changes:
-        cells += _change_cells(next((c for c in changes if c.measure.key == measure.key), None))
+        change = next((c for c in changes if c.measure.key == measure.key), None)
+        value, recorded = (change.value, change.recorded) if change else (None, None)
+        cells += [measure.text(value, sign=True), (change and change.percent) or "-"]
+        cells.append(measure.text(recorded, sign=True))
     return Row(tuple(cells))
-
-
-def _change_cells(change: Change | None) -> tuple[str, str, str]:
-    """Return the change, its share and the recorded one."""
-    if change is None:
-        return "-", "-", "-"
-    share = f"{100.0 * change.value / change.barefoot:+.0f}" if change.barefoot else "-"
-    measure = change.measure
-    return (
-        measure.text(change.value, sign=True), share, measure.text(change.recorded, sign=True)
-    )  # fmt: skip

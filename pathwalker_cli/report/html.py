@@ -52,9 +52,6 @@ def _svg(drawing: Drawing) -> Markup:
 def page_of(folders: Sequence[Path]) -> Page:
     """Return the page about runs with their studies, about recorded gait, or about a cohort.
 
-    Args:
-        folders: Folders that PathWalker's commands wrote.
-
     Raises:
         DataError: If a folder cannot be used, or they do not go together.
     """

@@ -143,19 +143,11 @@ def _measured(trial: Trial) -> bool:
 def _strength_table(rows: Rows) -> Table:
     """Return the maximum isometric torques beside those of the patient's file."""
     table_rows = tuple(
-        Row(
-            (
-                _muscles(row["generator"]),
-                number(row, "strength", ".1f"),
-                number(row, "patient file", ".1f"),
-                number(row, "deviation", "+.0f"),
-                row["stances"] or "-",
-                _span(row),
-                row["remark"] or "-",
-            )
-        )
+        Row((_muscles(row["generator"]), number(row, "strength", ".1f"),
+             number(row, "patient file", ".1f"), number(row, "deviation", "+.0f"),
+             row["stances"] or "-", _span(row), row["remark"] or "-"))
         for row in rows
-    )
+    )  # fmt: skip
     head = ("muscle group", "strength [N m]", "patient's file [N m]", "deviation [%]", "stances",
             "single stances [N m]", "remark")  # fmt: skip
     return Table(head, table_rows, columns="wnnnnnp")
@@ -178,15 +170,10 @@ def _span(row: Mapping[str, str]) -> str:
 def _residual_table(rows: Rows) -> Table:
     """Return what inverse dynamics leaves over, means over trials."""
     table_rows = tuple(
-        Row(
-            (
-                f"{row['condition']}, {row['part']}, {row['trial']}",
-                number(row, "forward mean", ".1f"),
-                number(row, "up mean", ".1f"),
-                number(row, "moment mean", ".2f"),
-            )
-        )
+        Row((f"{row['condition']}, {row['part']}, {row['trial']}",
+             number(row, "forward mean", ".1f"), number(row, "up mean", ".1f"),
+             number(row, "moment mean", ".2f")))
         for row in rows
         if row["trial"].endswith("over trials")
-    )
+    )  # fmt: skip
     return Table(("", "forward [N]", "up [N]", "moment [N m]"), table_rows)

@@ -2,64 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Final
+from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.report.content import Row, Section, Table
-from pathwalker_cli.report.figures import landscape_drawing, spread_drawing, tradeoff_drawing
+from pathwalker_cli.report.figures import drawn
 from pathwalker_cli.report.folders import Study
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.springs import recommended
-from pathwalker_cli.report.study_files import Spreads, landscape_of, spreads_of
+from pathwalker_cli.report.summaries import (
+    LandscapeSummary,
+    PerturbationSummary,
+    SensitivitySummary,
+    TradeoffSummary,
+    UncertaintySummary,
+    landscape_of,
+    spreads_of,
+)
 from pathwalker_cli.stride.measures import measure_of, measures_in
-from pathwalker_cli.studies.landscape.figures import Chosen
-from pathwalker_cli.studies.measures import COMPARED
+from pathwalker_cli.studies.landscape.figures import Chosen, cost_figure
+from pathwalker_cli.studies.landscape.result import Landscape
+from pathwalker_cli.studies.measures import COMPARED, Ranges
 from pathwalker_cli.studies.registry import STUDIES
-from pathwalker_cli.studies.sensitivity.result import label_of
-from pathwalker_cli.studies.tradeoff.result import FrontPoint, tradeoff_of_content
+from pathwalker_cli.studies.sensitivity.result import SHOWN, elasticity_text, label_of
+from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure
+from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
+from pathwalker_cli.studies.uncertainty.figures import spread_figure
 from pathwalker_cli.studies.uncertainty.result import Spread, shown_text
-
-_LEAST: Final = 1e-3
-"""Elasticity [% per %] below which a number moves nothing that matters."""
 
 
 def study_section(study: Study, run: ReportRun) -> Section:
     """Return table and figure of a study.
 
-    Args:
-        study: The study.
-        run: The run that it stands on.
-
     Raises:
         DataError: If its files are not those that the command wrote.
     """
-    make = {
-        "sensitivity": _sensitivity,
-        "perturb": _perturbation,
-        "landscape": _landscape,
-        "tradeoff": _tradeoff,
-        "uncertainty": _uncertainty,
-    }
     try:
-        return make.get(study.kind, _other)(study, run)
+        return _section(study, run)
     except (LookupError, TypeError, AttributeError, ValueError, StopIteration) as problem:
         what = f"does not hold what `pathwalker {study.kind}` writes: {problem!r}"
         raise DataError(what, where=str(study.folder), mend="make the study again") from None
 
 
-def _other(study: Study, run: ReportRun) -> Section:
-    """Return where the numbers of a study stand that pages draw no table of."""
-    entry = STUDIES[study.kind]
+def _section(study: Study, run: ReportRun) -> Section:
+    match study.summary:
+        case SensitivitySummary() as summary:
+            return _sensitivity(summary)
+        case PerturbationSummary() as summary:
+            return _perturbation(summary)
+        case LandscapeSummary() as summary:
+            return _landscape(landscape_of(summary, study.folder), run)
+        case TradeoffSummary(root=tradeoff):
+            return _tradeoff(tradeoff)
+        case UncertaintySummary() as summary:
+            return _uncertainty(summary, *spreads_of(summary, study.folder))
+    entry = STUDIES[study.kind]  # pages draw no table of it, but say where its numbers stand
     return Section(entry.heading, (f"{entry.title} Its numbers: {study.folder / entry.summary}.",))
 
 
-def _sensitivity(study: Study, run: ReportRun) -> Section:
+def _sensitivity(summary: SensitivitySummary) -> Section:
     """Return what one per cent more of every number changes."""
-    elasticities: Mapping[str, Mapping[str, Any]] = study.content["elasticities"]
+    elasticities = summary.elasticities
     shown = [
         m
         for m in measures_in("studies")
@@ -69,13 +76,13 @@ def _sensitivity(study: Study, run: ReportRun) -> Section:
     for place, values in elasticities.items():
         numbers = [values.get(measure.key) for measure in shown]
         if any(map(_moves, numbers)):
-            rows.append(Row((label_of(place), *map(_elasticity, numbers))))
+            rows.append(Row((label_of(place), *map(elasticity_text, numbers))))
     table = Table(
         ("one per cent more of", *(m.short for m in shown)),
         tuple(rows),
         caption="Elasticities at the optimum, % per %; a spring moves with the others following",
         notes=(
-            f"a dot is less than {_LEAST:g}; numbers that move nothing are left out",
+            f"a dot is less than {SHOWN:g}; numbers that move nothing are left out",
             "beyond a change of the active set the numbers no longer hold",
         ),
     )
@@ -84,37 +91,24 @@ def _sensitivity(study: Study, run: ReportRun) -> Section:
 
 def _moves(value: float | None) -> bool:
     """Return whether an elasticity is worth showing."""
-    return value is not None and abs(value) >= _LEAST
+    return value is not None and abs(value) >= SHOWN
 
 
-def _elasticity(value: float | None) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.3f}" if _moves(value) else "."
-
-
-def _perturbation(study: Study, run: ReportRun) -> Section:
+def _perturbation(summary: PerturbationSummary) -> Section:
     """Return what moved springs change."""
     rows = []
-    for row in study.content["rows"]:
-        name = measure_of(row["spring"]).label if "spring" in row else row["label"]
-        label = f"{name} {100.0 * (row['factor'] - 1.0):+.3g} %"
-        changes = (row["changes"].get(key) for key in COMPARED)
-        cells = (label, _moved_to(row), *map(_change, changes), row["note"])
-        rows.append(Row(cells, "" if row["status"] == "converged" else "failed"))
+    for row in summary.rows:
+        name = row.label if row.spring is None else measure_of(row.spring).label
+        # springs in the unit of the column, others in their own
+        moved_to = f"{row.value:.4g} {row.unit}" if row.spring is None else f"{row.stiffness:.1f}"
+        label = f"{name} {100.0 * (row.factor - 1.0):+.3g} %"
+        cells = (label, moved_to, *(_change(row.changes.get(key)) for key in COMPARED), row.note)
+        rows.append(Row(cells, "" if row.status == "converged" else "failed"))
     head = ("spring", "[N m/rad]", *(f"{measure_of(key).short} [%]" for key in COMPARED), "remark")
     columns = f"wn{'n' * len(COMPARED)}p"
     caption = "Changes when one spring is moved and all the rest is optimal again"
-    return Section(
-        "Perturbation of the springs", tables=(Table(head, tuple(rows), caption, columns=columns),)
-    )
-
-
-def _moved_to(row: Mapping[str, Any]) -> str:
-    """Return what a number was moved to: springs in the unit of the column, others in their own."""
-    if "stiffness" in row:
-        return f"{row['stiffness']:.1f}"
-    return f"{row['value']:.4g} {row['unit']}"
+    table = Table(head, tuple(rows), caption, columns=columns)
+    return Section("Perturbation of the springs", tables=(table,))
 
 
 def _change(share: float | None) -> str:
@@ -122,9 +116,8 @@ def _change(share: float | None) -> str:
     return "no solution" if share is None else f"{round(100.0 * share, 2) + 0.0:+.2f}"
 
 
-def _landscape(study: Study, run: ReportRun) -> Section:
+def _landscape(landscape: Landscape, run: ReportRun) -> Section:
     """Return the cost over K_D and K_P as a map, with the region of nearly best springs."""
-    landscape = landscape_of(study)
     orthosis = run.patient.orthosis
     springs = None if orthosis is None else orthosis.springs
     best, region = landscape.best, landscape.region
@@ -145,7 +138,9 @@ def _landscape(study: Study, run: ReportRun) -> Section:
         )
     if landscape.failed:
         lines.append(f"No solution at {len(landscape.failed)} of {len(landscape.bests)} points.")
-    drawing = landscape_drawing(landscape, springs, _chosen(run, landscape.side))
+    figure = partial(cost_figure, landscape, springs, _chosen(run, landscape.side))
+    title = "Cost above the least [%] over K_D and K_P [N m/rad]"
+    drawing = drawn(figure, "landscape", title, "tall")
     return Section("Landscape of the springs", tuple(lines), drawings=(drawing,))
 
 
@@ -165,9 +160,8 @@ def _side(side: str) -> str:
     return "both sides tied" if side == "both" else f"{side} side"
 
 
-def _tradeoff(study: Study, run: ReportRun) -> Section:
+def _tradeoff(tradeoff: Tradeoff) -> Section:
     """Return the front of speed and effort, and the springs along it."""
-    tradeoff = tradeoff_of_content(study.content)
     springs = tradeoff.springs
     head = ("weight of speed [s^2/m^2]", "speed [m/s]", "effort [s/m]",
             *(f"{measure_of(name).short} [N m/rad]" for name in springs), "remark")  # fmt: skip
@@ -185,7 +179,9 @@ def _tradeoff(study: Study, run: ReportRun) -> Section:
         "How much effort a faster gait takes: the objective weighs speed more and more. A "
         "dominated point is no faster and no cheaper than another one."
     ]
-    drawings = (tradeoff_drawing(tradeoff),) if tradeoff.solved else ()
+    title = "Effort per distance [s/m] and springs [N m/rad] over walking speed [m/s]"
+    figure = partial(tradeoff_figure, tradeoff)
+    drawings = (drawn(figure, "tradeoff", title, "tall"),) if tradeoff.solved else ()
     return Section("Trade-off of speed and effort", tuple(lines), tables=(table,),
                    drawings=drawings)  # fmt: skip
 
@@ -199,37 +195,40 @@ def _remark(point: FrontPoint) -> str:
     return "; ".join(remarks)
 
 
-def _uncertainty(study: Study, run: ReportRun) -> Section:
+def _uncertainty(
+    summary: UncertaintySummary, values: Mapping[str, np.ndarray], spreads: Sequence[Spread]
+) -> Section:
     """Return how far springs and gait spread when the patient's numbers are uncertain."""
-    spreads = spreads_of(study)
     head = ("", "unit", "base", "median", "90 % of draws", "follows most")
-    table = Table(head, tuple(_spread_row(spreads, each) for each in spreads.spreads),
-                  columns="wwnnnp")  # fmt: skip
-    count = spreads.draws - spreads.failed
-    lines = [f"{spreads.draws} draws of the uncertain numbers, {count} converged."]
-    lines += [words for each in spreads.spreads if (words := _chance(spreads, each))]
-    drawings = (spread_drawing(spreads),) if count else ()
+    rows = (_spread_row(each, summary.spreads[each.measure.key].strongest_input)
+            for each in spreads)  # fmt: skip
+    count = summary.draws - len(summary.failed)
+    lines = [f"{summary.draws} draws of the uncertain numbers, {count} converged."]
+    lines += [words for each in spreads if (words := _chance(each, summary.ranges))]
+    title = "Springs of all draws [N m/rad], and deviation of cost and gait from the base [%]"
+    figure = partial(spread_figure, values, summary.ranges, spreads)
+    drawings = (drawn(figure, "uncertainty", title, "tall"),) if count else ()
+    table = Table(head, tuple(rows), columns="wwnnnp")
     return Section("Uncertainty of the patient's numbers", tuple(lines), tables=(table,),
                    drawings=drawings)  # fmt: skip
 
 
-def _spread_row(spreads: Spreads, spread: Spread) -> Row:
+def _spread_row(spread: Spread, strongest: str | None) -> Row:
     measure = spread.measure
     low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
-    place = spreads.strongest.get(measure.key)
     return Row((
         measure.label, measure.shown_unit,
         shown_text(measure, spread.base), middle, f"{low} to {high}",
-        label_of(place) if place else "-",
+        label_of(strongest) if strongest else "-",
     ))  # fmt: skip
 
 
-def _chance(spreads: Spreads, spread: Spread) -> str:
+def _chance(spread: Spread, ranges: Ranges) -> str:
     """Return in words how often a spring sits at a limit, "" for other measures."""
     key, label, unit = spread.measure.key, spread.measure.label, spread.measure.unit
-    if key not in spreads.ranges:
+    if key not in ranges:
         return ""
-    low, high = spreads.ranges[key]
+    low, high = ranges[key]
     if low == high:
         return f"{label} is prescribed: {low:g} {unit}."
     if spread.lower is None or spread.upper is None:

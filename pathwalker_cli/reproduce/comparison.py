@@ -23,95 +23,58 @@ _BOUNDS: Final = "the authors' bounds are not published"
 
 Spreads = Mapping[str, Mapping[str, Spread]]
 """Recorded numbers by condition and quantity."""
-Reasons = Sequence[tuple[tuple[str, ...], Mapping[str, str]]]
-"""Subjects of `paper.NUMBERS`, and texts by the beginning of a quantity; the first one counts."""
+Reasons = Sequence[tuple[tuple[str, ...], str, str]]
+"""Subjects of `paper.NUMBERS`, the beginning of a quantity, and a text; the first one counts."""
 
 _REASONS: Final[Reasons] = (
-    (
-        ("healthy",),
-        {
-            "max_isometric_torque": "an input of the model: the value in the patient's file that "
-            "comes with PathWalker"
-        },
-    ),
-    (
-        ("patient",),
-        {
-            "max_isometric_torque_ankle": "which peaks entered the table is not said; the ankle's "
-            "is ill-conditioned",
-            "max_isometric_torque": "default: filtered motion and other stances; single stances "
-            "scatter widely",
-        },
-    ),
-    (
-        ("recorded",),
-        {
-            "residual_force_limit": "largest mean of a trial, per body mass, printed as N; default "
-            "counts measured frames only",
-            "residual_moment_limit": "largest mean of a trial, per body mass, printed as N m; "
-            "table 3 itself has 0.15",
-            "residual_over_peak_force": "largest mean residual of a trial over the mean peak of "
-            "measured stances; the article compares 3.3 N/kg with N",
-        },
-    ),
-    (
-        _RECORDED,
-        {
-            "residual_up": "per body mass, printed as N; default counts measured frames only, "
-            "published also support that no plate felt",
-            "residual_": "per body mass, printed as N and N m; default: filtered motion, measured "
-            "frames only",
-            "largest_deviation": "how they were taken is not said; ours: largest standard "
-            "deviation between strides in the gait cycle, least and greatest of pelvis, hip, "
-            "knee, ankle",
-            "ankle_torque_slope": "how it was taken is not said; ours: mean over measured stances "
-            "of least-squares lines",
-            "": "ours: all recordings; which ones the article counted is not said",
-        },
-    ),
-    (
-        ("ls-barefoot",),
-        {
-            "rms_one_trial": "the right heel of the published fit slides on the ground, ours may "
-            "not",
-            "rms_vertical_force": "how forces were averaged is not said; the published motion does "
-            "not give it either",
-        },
-    ),
-    (("mapd-ws-orthosis",), {"walking_speed": f"lambda rewards speed; {_BOUNDS}"}),
-    (
-        _PREDICTED,
-        {
-            "rms_one_trial": f"to one trial at equal time, as computed there; {_BOUNDS}",
-            "rms_vertical_force": f"how forces were averaged is not said; {_BOUNDS}",
-            "walking_speed_weight": "an input of the problem",
-            "walking_speed": f"least effort walks as slowly as it may; {_BOUNDS}",
-            "seconds_solve": "other solver, transcription and hardware",
-            "effort_per_distance": f"{_BOUNDS}; nothing published with the article allows to "
-            "check it",
-            "ankle_torque_slope": f"how it was taken is not said; {_BOUNDS}",
-            "": _BOUNDS,
-        },
-    ),
-    (
-        ("change",),
-        {
-            "min_stance_knee_flexion": "both knees of the published barefoot gait rest on a bound "
-            "of 0.6 rad, which makes the printed change"
-        },
-    ),
-)
+    (("healthy",), "max_isometric_torque",
+     "an input of the model: the value in the patient's file that comes with PathWalker"),
+    (("patient",), "max_isometric_torque_ankle",
+     "which peaks entered the table is not said; the ankle's is ill-conditioned"),
+    (("patient",), "max_isometric_torque",
+     "default: filtered motion and other stances; single stances scatter widely"),
+    (("recorded",), "residual_force_limit",
+     "largest mean of a trial, per body mass, printed as N; default counts measured frames only"),
+    (("recorded",), "residual_moment_limit",
+     "largest mean of a trial, per body mass, printed as N m; table 3 itself has 0.15"),
+    (("recorded",), "residual_over_peak_force",
+     "largest mean residual of a trial over the mean peak of measured stances; the article "
+     "compares 3.3 N/kg with N"),
+    (_RECORDED, "residual_up",
+     "per body mass, printed as N; default counts measured frames only, published also support "
+     "that no plate felt"),
+    (_RECORDED, "residual_",
+     "per body mass, printed as N and N m; default: filtered motion, measured frames only"),
+    (_RECORDED, "largest_deviation",
+     "how they were taken is not said; ours: largest standard deviation between strides in the "
+     "gait cycle, least and greatest of pelvis, hip, knee, ankle"),
+    (_RECORDED, "ankle_torque_slope",
+     "how it was taken is not said; ours: mean over measured stances of least-squares lines"),
+    (_RECORDED, "", "ours: all recordings; which ones the article counted is not said"),
+    (("ls-barefoot",), "rms_one_trial",
+     "the right heel of the published fit slides on the ground, ours may not"),
+    (("ls-barefoot",), "rms_vertical_force",
+     "how forces were averaged is not said; the published motion does not give it either"),
+    (("mapd-ws-orthosis",), "walking_speed", f"lambda rewards speed; {_BOUNDS}"),
+    (_PREDICTED, "rms_one_trial", f"to one trial at equal time, as computed there; {_BOUNDS}"),
+    (_PREDICTED, "rms_vertical_force", f"how forces were averaged is not said; {_BOUNDS}"),
+    (_PREDICTED, "walking_speed_weight", "an input of the problem"),
+    (_PREDICTED, "walking_speed", f"least effort walks as slowly as it may; {_BOUNDS}"),
+    (_PREDICTED, "seconds_solve", "other solver, transcription and hardware"),
+    (_PREDICTED, "effort_per_distance",
+     f"{_BOUNDS}; nothing published with the article allows to check it"),
+    (_PREDICTED, "ankle_torque_slope", f"how it was taken is not said; {_BOUNDS}"),
+    (_PREDICTED, "", _BOUNDS),
+    (("change",), "min_stance_knee_flexion",
+     "both knees of the published barefoot gait rest on a bound of 0.6 rad, which makes the "
+     "printed change"),
+)  # fmt: skip
 
 _NOT_COMPUTED: Final[Reasons] = (
-    (
-        ("mapd-orthosis",),
-        {
-            "largest_change_after": "not computed: the perturbation analysis is no part of this "
-            "command"
-        },
-    ),
-    (("literature",), {"": "not computed: a number of other works"}),
-)
+    (("mapd-orthosis",), "largest_change_after",
+     "not computed: the perturbation analysis is no part of this command"),
+    (("literature",), "", "not computed: a number of other works"),
+)  # fmt: skip
 """Numbers for which nothing is computed, and why."""
 
 
@@ -173,8 +136,7 @@ def _reason(number: PaperNumber, reasons: Reasons) -> str:
     """Return the text about a number, "" if there is none."""
     texts = (
         text
-        for subjects, group in reasons
-        for begin, text in group.items()
+        for subjects, begin, text in reasons
         if number.subject in subjects and number.quantity.startswith(begin)
     )
     return next(texts, "")
@@ -263,7 +225,12 @@ def _why(number: PaperNumber, results: Results) -> str:
     reason, result = _reason(number, _REASONS), results.problems.get(number.subject)
     if result is None or result.evaluation is None:
         return reason
-    parts = [_resting(number, result), reason]
+    parts = [
+        f"ours rests on its {bound.side} bound, {bound.value:.4g} {number.unit}"
+        for bound in result.bounds
+        if bound.name == number.quantity
+    ][:1]
+    parts.append(reason)
     if number.quantity.startswith("rms_one_trial_"):  # as the article words it
         key = number.quantity.replace("one_trial", "mean_cycle")
         parts += [
@@ -272,11 +239,3 @@ def _why(number: PaperNumber, results: Results) -> str:
             if row.measure.key == key and row.value is not None
         ]
     return "; ".join(part for part in parts if part)
-
-
-def _resting(number: PaperNumber, result: ProblemResult) -> str:
-    """Return that a quantity sits at its bound in this run, "" if it does not."""
-    for bound in result.bounds:
-        if bound.name == number.quantity:
-            return f"ours rests on its {bound.side} bound, {bound.value:.4g} {number.unit}"
-    return ""

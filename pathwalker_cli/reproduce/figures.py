@@ -3,117 +3,89 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side, to_degrees
-from pathwalker_cli.evaluation.curves import ANGLES, FORCES, CycleCurve, Trace
+from pathwalker_cli.evaluation.curves import Trace
 from pathwalker_cli.evaluation.figures import ankle_figure, cycle_figure
 from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.reproduce.results import ProblemResult, Results
-from pathwalker_cli.stride.figures import orthosis_curves
-from pathwalker_cli.stride.figures.curves import CLINICAL_ANGLE, EXTENSION
-from pathwalker_cli.stride.figures.save import save_formats
-from pathwalker_cli.stride.figures.style import (
-    NEUTRAL,
-    STYLE,
-    dress,
-    legend,
-    new_figure,
-    percent_axis,
-    zero_line,
+from pathwalker_cli.reproduce.words import SUBJECTS
+from pathwalker_cli.stride.figures import orthosis_curves, style
+from pathwalker_cli.stride.figures.curves import (
+    ANGLES,
+    CLINICAL_ANGLE,
+    EXTENSION,
+    FORCES,
+    CycleCurve,
 )
+from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import own_cycle
 
-_NAMES: Final = {
-    "ls-barefoot": "LS-Barefoot",
-    "mapd-barefoot": "MAPD-Barefoot",
-    "mapd-orthosis": "MAPD-Orthosis",
-    "mapd-ws-orthosis": "MAPD-WS-Orthosis",
-    "mapd-healthy": "MAPD-Healthy",
-}
 _ARTICLE: Final = ("mapd-orthosis", "mapd-barefoot", "ls-barefoot")
 """Problems that figures 3 and 4 of the article show."""
 _BEYOND: Final = ("mapd-ws-orthosis", "mapd-healthy")
 """Problems whose curves the article leaves to its supplement or out."""
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """One figure to be drawn."""
-
-    name: str
-    caption: str
-    make: Callable[[], Figure]
+_Plan = tuple[str, str, Callable[[], Figure]]
+"""Name and caption of a figure, and what draws it."""
 
 
 def save_paper_figures(results: Results, folder: Path) -> tuple[tuple[str, str], ...]:
     """Save the figures that the results allow as PNG and SVG.
 
-    Args:
-        results: What was computed.
-        folder: Where; made if it does not exist.
-
     Returns:
         PNG file name and caption of every figure.
     """
     saved = []
-    for plan in _plans(results):
-        with mpl.rc_context(STYLE):
-            figure = plan.make()
-        save_formats(figure, folder, plan.name)
-        saved.append((f"{plan.name}.png", plan.caption))
+    for name, caption, make in _plans(results):
+        with mpl.rc_context(style.STYLE):
+            figure = make()
+        save_formats(figure, folder, name)
+        saved.append((f"{name}.png", caption))
     return tuple(saved)
 
 
 def _plans(results: Results) -> Iterator[_Plan]:
     """Yield what can be drawn, in the order of the article."""
     solved = {name: each for name, each in results.problems.items() if each.converged}
-    yield _Plan(
-        "figure-1",
+    caption = (
         "Figure 1: active torque over angle and torque over angular velocity of the muscle torque "
-        "generators, as shares of the maximum isometric torque.",
-        curve_figure,
+        "generators, as shares of the maximum isometric torque."
     )
+    yield "figure-1", caption, curve_figure
     if "mapd-orthosis" in solved:
-        springs = _series(solved["mapd-orthosis"])
-        yield _Plan(
-            "figure-2",
-            "Figure 2: torque over angle of the orthoses, with the springs of MAPD-Orthosis.",
-            lambda: orthosis_curves(springs),
-        )
+        caption = "Figure 2: torque over angle of the orthoses, with the springs of MAPD-Orthosis."
+        yield "figure-2", caption, partial(orthosis_curves, _series(solved["mapd-orthosis"]))
     yield from _kinds(solved, "figure-3", "joint angles", ANGLES)
     yield from _kinds(solved, "figure-4", "ground reaction forces", FORCES)
     if {"mapd-barefoot", "mapd-orthosis"} <= solved.keys():
         gaits = tuple(_series(solved[name]) for name in ("mapd-barefoot", "mapd-orthosis"))
-        yield _Plan(
-            "figure-5",
-            "Figure 5: torques of the muscles, MAPD-Barefoot and MAPD-Orthosis, and the torque "
-            "of the orthoses at the ankles. Extension and plantarflexion are positive.",
-            lambda: muscle_torque_figure(*gaits),
+        caption = (
+            "Figure 5: torques of the muscles, MAPD-Barefoot and MAPD-Orthosis, and the torque of "
+            "the orthoses at the ankles. Extension and plantarflexion are positive."
         )
-        yield _Plan(
-            "figure-6",
-            "Figure 6: muscle activations and neural excitations, MAPD-Barefoot and MAPD-Orthosis.",
-            lambda: activation_figure(*gaits),
+        yield "figure-5", caption, partial(muscle_torque_figure, *gaits)
+        caption = (
+            "Figure 6: muscle activations and neural excitations, MAPD-Barefoot and MAPD-Orthosis."
         )
+        yield "figure-6", caption, partial(activation_figure, *gaits)
     if "mapd-orthosis" in solved:
-        trace = _trace(solved["mapd-orthosis"])
-        yield _Plan(
-            "figure-7",
+        caption = (
             "Figure 7: net ankle torque over ankle angle in stance, MAPD-Orthosis and recordings "
-            "with orthoses.",
-            lambda: ankle_figure(trace),
+            "with orthoses."
         )
+        yield "figure-7", caption, partial(ankle_figure, _trace(solved["mapd-orthosis"]))
 
 
 def _kinds(
@@ -126,8 +98,8 @@ def _kinds(
             trace = _trace(solved[problem])
             beyond = " (not in the article's main text)" if problem in _BEYOND else ""
             band = "" if trace.recorded is None else ", over the recorded range"
-            caption = f"{number}, {_NAMES[problem]}{beyond}: {what}{band}."
-            yield _Plan(f"{name}-{problem}", caption, partial(cycle_figure, trace, curves))
+            caption = f"{number}, {SUBJECTS[problem]}{beyond}: {what}{band}."
+            yield f"{name}-{problem}", caption, partial(cycle_figure, trace, curves)
 
 
 def _series(result: ProblemResult) -> GaitSeries:
@@ -163,7 +135,7 @@ def curve_figure() -> Figure:
     Shares of the maximum isometric torque; flexion and dorsiflexion angles are positive, and so is
     the velocity of shortening.
     """
-    fig = new_figure(4.4)
+    fig = style.new_figure(4.4)
     grid = fig.subplots(3, 2, sharey="col")
     by_name = {each.name: each for each in generators()}
     angle, speed = np.linspace(-2.0, 2.0, 401), np.linspace(-_LARGEST_SPEED, _LARGEST_SPEED, 401)
@@ -178,11 +150,10 @@ def curve_figure() -> Figure:
             grid[row][1].plot(speed, share, **look)
         grid[row][0].set_xlim(*_ANGLES[joint])
         flexion = "dorsiflexion" if joint == "ankle" else "flexion"
-        title = joint.capitalize()
-        dress(grid[row][0], title, f"{flexion} [deg]", "torque-angle factor [1]")
-        dress(grid[row][1], title, "shortening velocity\n[rad/s]", "torque-velocity factor [1]")
-    handles = [Line2D([], [], label=name, **_LOOK[name]) for name in _DIRECTIONS]  # type: ignore[arg-type]
-    legend(fig, handles)
+        title, speeds = joint.capitalize(), "shortening velocity\n[rad/s]"
+        style.dress(grid[row][0], title, f"{flexion} [deg]", "torque-angle factor [1]")
+        style.dress(grid[row][1], title, speeds, "torque-velocity factor [1]")
+    style.legend(fig, [style.entry(name, **_LOOK[name]) for name in _DIRECTIONS])
     return fig
 
 
@@ -190,17 +161,13 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
     """Return the muscle torques of both gaits at hip, knee and ankle of each side.
 
     Extension and plantarflexion are positive; the torque of the orthoses is drawn thin.
-
-    Args:
-        barefoot: The gait without orthoses.
-        orthosis: The gait with orthoses.
     """
-    fig = new_figure(4.2)
+    fig = style.new_figure(4.2)
     grid = fig.subplots(3, 2, sharex=True, sharey="row")
     for column, side in enumerate(SIDES):
         for ax, joint in zip(grid[:, column], LEG_JOINTS, strict=True):
-            dress(ax, f"{side.capitalize()} {joint}", y="" if column else _TORQUE)
-            zero_line(ax)
+            style.dress(ax, f"{side.capitalize()} {joint}", y="" if column else _TORQUE)
+            style.zero_line(ax)
             for series, look in ((barefoot, _BAREFOOT), (orthosis, _ORTHOSIS)):
                 for direction in _DIRECTIONS:
                     name = f"{joint}_{direction}_{SUFFIX[side]}"
@@ -208,37 +175,30 @@ def muscle_torque_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
                     _draw(ax, series, side, EXTENSION[joint] * torque, look)
             if joint == "ankle":
                 own = orthosis.orthosis_torque[:, SIDES.index(side)]
-                _draw(ax, orthosis, side, own, {"color": NEUTRAL, "linewidth": 0.7})
-            percent_axis(ax, *([] if joint == LEG_JOINTS[-1] else [""]))
-    thin = Line2D([], [], color=NEUTRAL, linewidth=0.7, label="thin: orthosis")
-    legend(fig, [*_gait_handles(), thin])
+                _draw(ax, orthosis, side, own, {"color": style.NEUTRAL, "linewidth": 0.7})
+            style.percent_axis(ax, *([] if joint == LEG_JOINTS[-1] else [""]))
+    style.legend(fig, [*_gait_handles(), style.entry("thin: orthosis", linewidth=0.7)])
     return fig
 
 
 def activation_figure(barefoot: GaitSeries, orthosis: GaitSeries) -> Figure:
-    """Return activations and excitations of both gaits for the muscles of each leg.
-
-    Args:
-        barefoot: The gait without orthoses.
-        orthosis: The gait with orthoses.
-    """
-    fig = new_figure(3.8)
+    """Return activations and excitations of both gaits for the muscles of each leg."""
+    fig = style.new_figure(3.8)
     grid = fig.subplots(3, 4, sharex=True, sharey=True)
     columns = [(side, direction) for side in SIDES for direction in _DIRECTIONS]
     for row, joint in zip(grid, LEG_JOINTS, strict=True):
         for ax, (side, direction) in zip(row, columns, strict=True):
             name = f"{joint}_{direction}_{SUFFIX[side]}"
             column = GENERATORS.index(name)
-            dress(ax, f"{side.capitalize()} {joint}\n{direction}",
+            style.dress(ax, f"{side.capitalize()} {joint}\n{direction}",
                   y="activation [1]" if (side, direction) == columns[0] else "")  # fmt: skip
             for series, look in ((barefoot, _BAREFOOT), (orthosis, _ORTHOSIS)):
                 thin = {**look, "linewidth": 0.6, "alpha": 0.7}
                 _draw(ax, series, side, series.excitation[:, column], thin)
                 _draw(ax, series, side, series.activation[:, column], look)
-            percent_axis(ax, "own cycle\n[%]" if joint == LEG_JOINTS[-1] else "")
+            style.percent_axis(ax, "own cycle\n[%]" if joint == LEG_JOINTS[-1] else "")
     grid[0][0].set_ylim(-0.03, 1.05)
-    thin_handle = Line2D([], [], color=NEUTRAL, linewidth=0.6, label="thin: excitation")
-    legend(fig, [*_gait_handles(), thin_handle])
+    style.legend(fig, [*_gait_handles(), style.entry("thin: excitation", linewidth=0.6)])
     return fig
 
 
@@ -250,9 +210,7 @@ def _draw(
     ax.plot(cycle.percent, values[cycle.index], **look)  # type: ignore[arg-type]
 
 
-def _gait_handles() -> Sequence[Line2D]:
+def _gait_handles() -> list[Artist]:
     """Return the legend entries of the two gaits."""
-    return [
-        Line2D([], [], label=label, **look)  # type: ignore[arg-type]
-        for label, look in (("MAPD-Barefoot", _BAREFOOT), ("MAPD-Orthosis", _ORTHOSIS))
-    ]
+    looks = {"MAPD-Barefoot": _BAREFOOT, "MAPD-Orthosis": _ORTHOSIS}
+    return [style.entry(label, **look) for label, look in looks.items()]

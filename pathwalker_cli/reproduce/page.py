@@ -78,7 +78,8 @@ def page_text(
         lines += _plainly(plain_rows) if plain_rows else []
     lines += ["", "### Table 5: springs that are 5 % softer", "", *_table_5()]
     lines += ["", "### Changes that the article states", "", *_change_lines(results.changes)]
-    lines += ["", "## Figures", "", *_figure_lines(figures)]
+    pictures = [f"![{caption}]({file})\n\n*{caption}*\n" for file, caption in figures]
+    lines += ["", "## Figures", "", *(pictures or ["None: no problem converged."])]
     return "\n".join(lines) + "\n"
 
 
@@ -86,14 +87,12 @@ def _state(results: Results, versions: Mapping[str, str], date: str) -> Iterator
     """Yield when and with what this was made, and what is missing."""
     yield f"Made on {date} with {', '.join(f'{n} {v}' for n, v in versions.items())}."
     if results.quick:
-        yield ""
         yield (
-            "**A quick check:** coarse meshes without refinement and one start, to see that "
+            "\n**A quick check:** coarse meshes without refinement and one start, to see that "
             "everything runs. The numbers are for orientation only."
         )
     if results.failed:
-        yield ""
-        yield (f"**Did not converge:** {', '.join(results.failed)}. Nothing of them is used below.")
+        yield f"\n**Did not converge:** {', '.join(results.failed)}. Nothing of them is used below."
 
 
 def _plainly(rows: Iterable[Row]) -> list[str]:
@@ -136,8 +135,7 @@ def _why(row: Row) -> str:
 
 def _table_5() -> Iterator[str]:
     """Yield table 5 as printed: nothing of it is computed here."""
-    yield "Not computed: the perturbation analysis is no part of this command. Printed, in %:"
-    yield ""
+    yield "Not computed: the perturbation analysis is no part of this command. Printed, in %:\n"
     own = [number for number in NUMBERS if number.place == "table 5"]
     springs = groupby(own, lambda number: number.quantity.partition("_after_-5%_")[2])
     by_spring = {spring: list(numbers) for spring, numbers in springs}
@@ -157,39 +155,19 @@ def _change_lines(changes: Sequence[Change]) -> Iterator[str]:
         return
     cells = []
     for change in changes:
-        if change.paper is None:
+        if (paper := change.paper) is None:
             continue
-        measure = change.measure
-        paper = change.paper
         rises = paper.rises if isinstance(paper, PaperClaim) else paper.value > 0.0
         moved = abs(change.value) > _UNCHANGED * abs(change.barefoot)
         same = ("yes" if (change.value > 0.0) == rises else "no") if moved else "no, unchanged"
-        cells.append(
-            (
-                f"{measure.section.lower()}: {measure.row} [{measure.unit}]",
-                "rises" if rises else "falls",
-                plain(change.barefoot, ".3f"),
-                plain(change.orthosis, ".3f"),
-                plain(change.value, "+.3f"),
-                plain(change.recorded, "+.3f"),
-                same,
-            )
-        )
+        ours = (plain(change.barefoot, ".3f"), plain(change.orthosis, ".3f"),
+                plain(change.value, "+.3f"), plain(change.recorded, "+.3f"))  # fmt: skip
+        name = f"{change.measure.section.lower()}: {change.measure.row} [{change.measure.unit}]"
+        cells.append((name, "rises" if rises else "falls", *ours, same))
     yield "From MAPD-Barefoot to MAPD-Orthosis, SI units and radians; recorded: change of the mean."
     yield ""
     head = ("quantity", "paper", "barefoot", "orthosis", "change", "recorded", "same direction")
     yield from table(head, cells)
-
-
-def _figure_lines(figures: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yield the figures with their captions."""
-    if not figures:
-        yield "None: no problem converged."
-    for file, caption in figures:
-        yield f"![{caption}]({file})"
-        yield ""
-        yield f"*{caption}*"
-        yield ""
 
 
 Metrics = Mapping[str, Any]
@@ -209,11 +187,6 @@ def _sides(stem: str, form: str) -> Callable[[Metrics], str]:
     return _pair(form, f"{stem}_left", f"{stem}_right")
 
 
-def _knees(metrics: Metrics) -> str:
-    """Return the crouch measure left and right [deg]."""
-    return ", ".join(degrees(metrics[f"min_stance_knee_flexion_{s}"]) for s in ("left", "right"))
-
-
 _SOLVE: Final[dict[str, Callable[[Metrics], str]]] = {
     "status": lambda m: str(m["status"]),
     "cost": _pair(".4f", "cost"),
@@ -227,7 +200,9 @@ _SOLVE: Final[dict[str, Callable[[Metrics], str]]] = {
 _GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
     "walking speed [m/s]": _pair(".3f", "walking_speed"),
     "step length left, right [m]": _sides("step_length", ".3f"),
-    "least knee flexion of stance left, right [deg]": _knees,
+    "least knee flexion of stance left, right [deg]": lambda m: ", ".join(
+        degrees(m[f"min_stance_knee_flexion_{side}"]) for side in ("left", "right")
+    ),
     "effort per distance [s/m]": _pair(".4f", "effort_per_distance"),
     "peak vertical force left, right [body weights]": _pair(
         ".2f", "peak_vertical_force_left_body_weights", "peak_vertical_force_right_body_weights"
@@ -255,11 +230,8 @@ def problem_lines(results: Results) -> Iterator[str]:
         shown = (show(each.metrics) if each.converged else "-" for each in problems.values())
         rows.append((name, *(text.replace("-, -", "-") for text in shown)))
     yield from table(("", *problems), rows)
-    yield ""
-    yield "*kept*: solved by an earlier call with the same config; its times are those of then."
-    yield ""
-    yield "Active bounds that shape the gait:"
-    yield ""
+    yield "\n*kept*: solved by an earlier call with the same config; its times are those of then."
+    yield "\nActive bounds that shape the gait:\n"
     for name, each in problems.items():
         bounds = "; ".join(_shaping_bounds(each)) or "none"
         yield f"- {name}: {bounds if each.converged else 'did not converge'}"
@@ -280,24 +252,17 @@ def _optima(result: ProblemResult) -> Iterator[str]:
     """Yield the table of the local optima of one problem."""
     optima = result.metrics["local_optima"]
     best = optima[0]["cost"]
-    yield ""
-    yield f"{result.problem}, {len(optima)} starts:"
-    yield ""
+    yield f"\n{result.problem}, {len(optima)} starts:\n"
+    shares = [100.0 * (each["cost"] - best) / abs(best) if best and each["cost"] is not None
+              else None for each in optima]  # fmt: skip
     rows = [
         (str(each["start"]), each["status"], plain(each["cost"], ".4f"),
-         _above(each["cost"], best), plain(each["walking_speed"], ".3f"),
+         "-" if share is None else f"{share:+.1f} %", plain(each["walking_speed"], ".3f"),
          ", ".join(plain(k, ".1f") for k in each["stiffness"]) or "-",
          str(each["iterations"]), plain(each["seconds"], ".0f"), each["description"])
-        for each in optima
+        for each, share in zip(optima, shares, strict=True)
     ]  # fmt: skip
     head = ("start", "status", "cost", "above the best", "speed [m/s]",
             "K_D right, left, K_P right, left [N m/rad]", "iterations", "seconds",
             "began with")  # fmt: skip
     yield from table(head, rows)
-
-
-def _above(cost: float | None, best: float | None) -> str:
-    """Return by how much a cost lies above the best one."""
-    if cost is None or not best:
-        return "-"
-    return f"{100.0 * (cost - best) / abs(best):+.1f} %"

@@ -188,13 +188,7 @@ def recordings() -> dict[Condition, RecordedGait]:
 def evaluated(
     folder: Path, kept: bool, recorded: Mapping[Condition, RecordedGait]
 ) -> ProblemResult:
-    """Return the result that a run folder holds.
-
-    Args:
-        folder: The run folder, converged or not.
-        kept: Whether it was solved before and not again.
-        recorded: The recordings of the article's patient.
-    """
+    """Return the result that a run folder holds."""
     run = load_run(folder, allow_unconverged=True)
     config, metrics = run.config, run.metrics
     result = ProblemResult(config.problem, metrics, run.result.bounds, config, kept)

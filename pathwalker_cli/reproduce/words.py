@@ -17,7 +17,7 @@ _FACTOR: Final = {"deg": float(to_degrees(1.0)), "%": 100.0, "h": 1.0 / 3600.0}
 _LEAST_DIGITS: Final = {"m": 3, "m/s": 3, "s/m": 3, "N/kg": 2, "N m/kg": 2}
 """Digits after the point that we show at least, where the article truncates to fewer."""
 
-_SUBJECTS: Final = {
+SUBJECTS: Final = {
     "ls-barefoot": "LS-Barefoot",
     "mapd-barefoot": "MAPD-Barefoot",
     "mapd-orthosis": "MAPD-Orthosis",
@@ -31,6 +31,7 @@ _SUBJECTS: Final = {
     "patient": "patient",
     "literature": "earlier predictions of others",
 }
+"""What numbers are about, in words: problems and recordings."""
 
 _QUANTITIES: Final = {measure.key: measure.row for measure in compared()} | {
     "min_stance_knee_flexion_left": "least knee flexion of stance, left",
@@ -53,7 +54,7 @@ _SIDE: Final = re.compile(r"_([lr])$")
 
 def subject(number: PaperNumber) -> str:
     """Return what a number is about, in words."""
-    return _SUBJECTS[number.subject]
+    return SUBJECTS[number.subject]
 
 
 def label(number: PaperNumber) -> str:

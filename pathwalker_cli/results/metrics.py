@@ -120,12 +120,7 @@ def sha256(content: bytes) -> str:
 
 
 def run_inputs(case: Case, warm_start: str | Path | None = None) -> RunInputs:
-    """Return what a run is made from.
-
-    Args:
-        case: What is solved, and for whom.
-        warm_start: Folder of the run to begin with.
-    """
+    """Return what a run is made from."""
     kept = {"config": config_text(case.config), "patient_kept": case.patient_text}
     hashes = {name: sha256(text.encode()) for name, text in kept.items()}
     if case.content_hash is not None:
@@ -165,13 +160,7 @@ def metrics_hash(metrics: Mapping[str, Any]) -> str:
 def run_metrics(
     solution: GaitSolution, inputs: RunInputs, more: Mapping[str, Any] | None = None
 ) -> RunMetrics:
-    """Return all metrics of a solve.
-
-    Args:
-        solution: How it ended.
-        inputs: What it was made from.
-        more: Further entries, plain values.
-    """
+    """Return all metrics of a solve."""
     began = time.perf_counter()
     proof = _proof(solution)  # runs the second engine
     verify = solution.seconds["verify"] + time.perf_counter() - began

@@ -110,7 +110,9 @@ def read_arrays(path: Path) -> Mapping[str, np.ndarray]:
         with np.load(path, allow_pickle=False) as file:
             if not isinstance(file, np.lib.npyio.NpzFile):
                 raise DataError("is a single array", where=str(path), allowed="a motion of a run")
-            if _unpacked_size(path) > _MOST_BYTES:
+            with zipfile.ZipFile(path) as archive:
+                unpacked = sum(member.file_size for member in archive.infolist())
+            if unpacked > _MOST_BYTES:
                 what = f"holds more than {_MOST_BYTES // 1_000_000} MB"
                 raise DataError(what, where=str(path), mend=_AGAIN)
             arrays = {name: file[name] for name in file.files}
@@ -124,20 +126,10 @@ def read_arrays(path: Path) -> Mapping[str, np.ndarray]:
 
 
 def _floats(values: np.ndarray) -> np.ndarray:
-    """Return an array of floating point numbers.
-
-    Raises:
-        TypeError: If it holds something else.
-    """
+    """Return an array of floating point numbers."""
     if values.dtype.kind != "f":
         raise TypeError(f"an array of type {values.dtype}")
     return values
-
-
-def _unpacked_size(path: Path) -> int:
-    """Return the bytes that all members of an archive take once they are unpacked."""
-    with zipfile.ZipFile(path) as archive:
-        return sum(member.file_size for member in archive.infolist())
 
 
 def _check(motion: PhasedMotion, path: str | Path) -> None:

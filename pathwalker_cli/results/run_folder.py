@@ -94,12 +94,7 @@ class Run:
 
 
 def default_folder(config: StudyConfig, patient: str) -> Path:
-    """Return where a run is written if nobody says where; a quick check stands apart.
-
-    Args:
-        config: The config.
-        patient: Id of the patient.
-    """
+    """Return where a run is written if nobody says where; a quick check stands apart."""
     return Path("runs") / f"{config.problem}-{patient}{'-smoke' if config.smoke else ''}"
 
 
@@ -348,22 +343,25 @@ def _read_metrics(folder: Path) -> dict[str, Any]:
     return metrics
 
 
+def load_converged(folder: str | Path, where: str = "", mend: str = "") -> Run:
+    """Return a run that somebody named at `where`.
+
+    Raises:
+        DataError: If it cannot be used or did not converge.
+    """
+    try:
+        return load_run(folder)
+    except NotConvergedError as error:
+        raise DataError(str(error), where=where, allowed="a converged run", mend=mend) from None
+
+
 def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
     """Return the run that a solve shall begin with.
-
-    Args:
-        folder: Its folder.
-        config: What is to be solved.
 
     Raises:
         DataError: If it cannot be used, did not converge or is about another condition.
     """
-    try:
-        run = load_run(folder)
-    except NotConvergedError as error:
-        raise DataError(
-            str(error), where="--warm-start", allowed="a converged run", mend="solve it again first"
-        ) from None
+    run = load_converged(folder, "--warm-start", "solve it again first")
     if run.config.condition != config.condition:
         raise DataError(
             f"is a run of {run.config.problem} ({run.config.condition}), whose free parameters "

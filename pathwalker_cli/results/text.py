@@ -95,19 +95,19 @@ def summary_rows(
     return rows
 
 
-def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = ()) -> str:
+def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = (), width: int = 0) -> str:
     """Return labels and values as plain text, then what else to know, one line each."""
-    width = max(len(label) for label, _ in rows)
+    width = max([width, *(len(label) for label, _ in rows)])
     lines = [f"{label:<{width}}  {value}" for label, value in rows]
     return "\n".join([*lines, *(f"note: {note}" for note in notes)])
 
 
 def summary_renderable(
-    rows: Sequence[tuple[str, str]], notes: Iterable[str] = ()
+    rows: Sequence[tuple[str, str]], notes: Iterable[str] = (), width: int = 0
 ) -> RenderableType:
-    """Return the same for a `rich` console, which drops the colours off a terminal."""
+    """Return the same for a `rich` console, on which long texts stay in their column."""
     table = Table.grid(padding=(0, 2))
-    table.add_column(style="dim", no_wrap=True)
+    table.add_column(style="dim", no_wrap=True, min_width=width)
     table.add_column()
     for label, value in rows:
         table.add_row(label, Text(value))
@@ -154,19 +154,14 @@ def bound_line(bound: ActiveBound) -> str:
 
 
 def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return label and text of proof, active bounds, stages and times.
-
-    Args:
-        solution: How the solve ended.
-        metrics: Its metrics as they were written.
-    """
-    worst = solution.violations[0]
+    """Return label and text of proof, active bounds, stages and times."""
+    worst, terms = solution.violations[0], solution.cost_terms
     errors = solution.reintegration
     again = f"{errors.worst_position:.1e} rad or m, {errors.worst_velocity:.1e} rad/s or m/s"
     stages = (f"{s.name} {s.iterations} in {s.seconds:.1f} s" for s in solution.stages)
     seconds = (f"{part} {metrics[f'seconds_{part}']:.1f}" for part in ("build", "solve", "verify"))
     rows = [
-        ("cost terms", _sum_text(solution.cost_terms)),
+        ("cost terms", " + ".join(f"{_words(n)} {v:.4g}" for n, v in terms.items() if v)),
         ("clinical goals", ", ".join(f"{_words(n)} {v:.4g}" for n, v in metrics["goals"].items())),
         ("largest violation", f"{worst.amount:.1e} ({worst.name})"),
         ("re-integration error", again),
@@ -185,11 +180,6 @@ def _balance_text(found: Mapping[str, float]) -> str:
     return f"work and energy within {energy}, forces and momentum within {momentum}"
 
 
-def _sum_text(terms: Mapping[str, float]) -> str:
-    """Return the terms that count, e.g. "effort per distance 0.2535 + walking speed -1.3"."""
-    return " + ".join(f"{_words(name)} {value:.4g}" for name, value in terms.items() if value)
-
-
 def _words(name: str) -> str:
     return name.replace("_", " ")
 
@@ -206,22 +196,13 @@ def optimum_lines(optima: Sequence[LocalOptimum]) -> list[tuple[str, str]]:
     if len(costs) > 1:
         near = sum(cost <= costs[0] + 0.05 * abs(costs[0]) for cost in costs)
         spread = (costs[-1] - costs[0]) / abs(costs[0])
-        lines.append(
-            (
-                "local optima",
-                f"{len(costs)} of {len(optima)} starts converged, {near} within 5 % of the best; "
-                f"the worst is {100 * spread:.1f} % above",
-            )
-        )
+        text = f"{len(costs)} of {len(optima)} starts converged, {near} within 5 % of the best; "
+        lines.append(("local optima", f"{text}the worst is {100 * spread:.1f} % above"))
     return lines
 
 
 def source_lines(sources: Mapping[str, str]) -> list[str]:
-    """Return where the bounds come from, in short: equal reasons are said once.
-
-    Args:
-        sources: `GaitBounds.sources`.
-    """
+    """Return where the bounds come from, in short: equal reasons are said once."""
     groups: dict[tuple[str, str], list[str]] = {}
     for name, text in sources.items():
         if name in _ANGLES:
@@ -242,12 +223,7 @@ def source_lines(sources: Mapping[str, str]) -> list[str]:
 
 
 def failure_text(solution: GaitSolution, folder: str) -> str:
-    """Return one sentence about a solve that did not converge.
-
-    Args:
-        solution: How it ended.
-        folder: Where its files are.
-    """
+    """Return one sentence about a solve that did not converge."""
     why = solution.shortfall
     parts = [] if why is None else [shortfall_text(why)]
     if why is None or not why.too_weak:
@@ -301,11 +277,7 @@ def _in_words(generator: str) -> str:
 
 
 def notes_together(notes: Sequence[str]) -> tuple[str, ...]:
-    """Return what was filled in for a patient, lengths from body proportions in one sentence.
-
-    Args:
-        notes: Notes of the patient, one per number that was filled in.
-    """
+    """Return what was filled in for a patient, lengths from body proportions in one sentence."""
     begin = "segment length "
     lengths = [note for note in notes if note.startswith(begin)]
     names = ", ".join(note.removeprefix(begin).partition(":")[0] for note in lengths)
@@ -336,15 +308,12 @@ def orthosis_rows(orthosis: OrthosisData) -> list[tuple[str, str]]:
     }
     if len(set(stops.values())) == 1:
         stops = {" and ".join(SIDES): stops[SIDES[0]]}
-    rows = [
-        (
-            "orthosis",
-            f"per leg {mass.shank:g} kg on the shank, {mass.foot:g} kg on the foot; right and "
-            f"left: neutral angle {angle_words(orthosis.neutral_angle)}, play {play:.1f} deg "
-            f"around it, preload {orthosis.preload_torque:g} N m either way",
-        ),
-        *(("stops", f"{side}: {text}") for side, text in stops.items()),
-    ]
+    worn = (
+        f"per leg {mass.shank:g} kg on the shank, {mass.foot:g} kg on the foot; right and "
+        f"left: neutral angle {angle_words(orthosis.neutral_angle)}, play {play:.1f} deg "
+        f"around it, preload {orthosis.preload_torque:g} N m either way"
+    )
+    rows = [("orthosis", worn), *(("stops", f"{side}: {text}") for side, text in stops.items())]
     span = orthosis.stiffness_range
     ranges = [f"{k} {_range(getattr(span, name))}" for name, k in _KINDS.items()]
     rows.append(("springs", f"{', '.join(ranges)} N m/rad ({span.source})"))

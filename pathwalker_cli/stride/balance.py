@@ -54,20 +54,23 @@ def balance(series: GaitSeries) -> Balance:
     states = [_State.of(series, k, data) for k in range(len(series.time))]
     energy = np.array([state.energy for state in states])
     momentum = np.array([state.momentum for state in states])
-    power = _powers(series, states)
-    work = np.cumsum(weights * (power.muscle + power.orthosis + power.contact))
+    powers = series.element_power
+    muscles = powers[:, walker.columns((*walker.muscles, *walker.tissue))]
+    orthosis = powers[:, walker.columns(walker.device.forces)].sum(axis=1)
+    contact = np.array([state.contact_power for state in states])
+    work = np.cumsum(weights * (muscles.sum(axis=1) + orthosis + contact))
     gained = energy - energy[0]
     forces = np.array([state.force_and_moment for state in states])
     impulse = np.cumsum(weights[:, None] * forces, axis=0)
     missed = np.abs(impulse - (momentum - momentum[0]))[rows].max(axis=0)
     load = walker.weight * series.duration
     return Balance(
-        muscle_work=float(weights @ power.muscle),
-        orthosis_work=float(weights @ power.orthosis),
-        contact_work=float(weights @ np.abs(power.contact)),
+        muscle_work=float(weights @ muscles.sum(axis=1)),
+        orthosis_work=float(weights @ orthosis),
+        contact_work=float(weights @ np.abs(contact)),
         energy_change=float(gained[-1]),
         energy=float(np.abs(work - gained)[rows].max()),
-        work_scale=float(weights @ power.amounts),
+        work_scale=float(weights @ np.abs(muscles).sum(axis=1)),
         impulse=float(missed[:2].max()),
         impulse_scale=load,
         angular_impulse=float(missed[2]),
@@ -131,25 +134,3 @@ class _State:
             force_and_moment=np.array([force[0], force[2], moment[1]]),
             contact_power=power,
         )
-
-
-@dataclass(frozen=True)
-class _Powers:
-    """Powers at every instant [W]; `amounts` adds up those of single muscles without sign."""
-
-    muscle: np.ndarray
-    orthosis: np.ndarray
-    contact: np.ndarray
-    amounts: np.ndarray
-
-
-def _powers(series: GaitSeries, states: list[_State]) -> _Powers:
-    powers, walker = series.element_power, series.walker
-    each = powers[:, walker.columns((*walker.muscles, *walker.tissue))]
-    worn = powers[:, walker.columns(walker.device.forces)]
-    return _Powers(
-        muscle=each.sum(axis=1),
-        orthosis=worn.sum(axis=1),
-        contact=np.array([state.contact_power for state in states]),
-        amounts=np.abs(each).sum(axis=1),
-    )

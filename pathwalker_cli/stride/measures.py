@@ -43,10 +43,6 @@ def _stance_share(stride: Stride, side: Side) -> float:
     return _stance_time(stride, side) / stride.duration
 
 
-def _swing_time(stride: Stride, side: Side) -> float:
-    return stride.duration - _stance_time(stride, side)
-
-
 def _double_support(stride: Stride) -> float:
     """Return the time with both feet on the ground [s]."""
     return sum(_stance_time(stride, side) for side in SIDES) - stride.duration
@@ -99,10 +95,6 @@ def _work(stride: Stride, muscles: bool, sign: float) -> float:
     return sign * float(stride.weights @ np.maximum(sign * power, 0.0).sum(axis=1))
 
 
-def _ankle_slope(stride: Stride, side: Side) -> float:
-    return ankle_torque_line(stride, side)[0]
-
-
 def ankle_torque_line(stride: Stride, side: Side) -> tuple[float, float]:
     """Return slope [N m/rad] and torque at zero angle [N m] of the ankle's net torque.
 
@@ -133,14 +125,6 @@ def ankle_line(profile: np.ndarray) -> tuple[float, float]:
     """
     slope, offset = np.polyfit(profile[:, 0], profile[:, 1], 1)
     return float(slope), float(offset)
-
-
-def _profile_slope(stride: Stride, side: Side) -> float:
-    return ankle_line(stride.ankle_profile(side))[0]
-
-
-def _peak_ankle_torque(stride: Stride, side: Side) -> float:
-    return float(stride.ankle_profile(side)[:, 1].max())
 
 
 def _ankle_extensor(stride: Stride, side: Side, of: str, mean: bool) -> float:
@@ -186,7 +170,7 @@ REGISTRY: tuple[Measure, ...] = (
               "share of the stride with the foot in the air",
               lambda s, side: 1.0 - _stance_share(s, side), section=WALK),
     *per_side("swing_time_*", "swing time, *", "s", "time from toe-off to the next foot strike",
-              _swing_time, section=WALK, kept=False),
+              lambda s, side: s.duration - _stance_time(s, side), section=WALK, kept=False),
     Measure("double_support_share", "double support share", "1",
             "share of the stride with both feet on the ground",
             lambda s: _double_support(s) / s.duration, section=WALK),
@@ -247,13 +231,15 @@ REGISTRY: tuple[Measure, ...] = (
             lambda s: max(0.0, -s.contact_position[:, :, 1].min()), shown=False),
     *per_side("ankle_torque_slope_*", "ankle torque slope, *", "N m/rad",
               "slope of net ankle torque over dorsiflexion while flat or on the toe",
-              _ankle_slope, section=LOADS),
+              lambda s, side: ankle_torque_line(s, side)[0], section=LOADS),
     *per_side("ankle_torque_slope_stance_*", "ankle torque slope over stance, *", "N m/rad",
               "slope of net ankle torque over dorsiflexion, every per cent of stance alike",
-              _profile_slope, "mean slope, *", section=ANKLE, part="stance", kept=False),
-    *per_side("peak_net_ankle_torque_*", "peak net ankle torque, *", "N m",
-              "largest net plantarflexing ankle torque of stance", _peak_ankle_torque, "peak, *",
+              lambda s, side: ankle_line(s.ankle_profile(side))[0], "mean slope, *",
               section=ANKLE, part="stance", kept=False),
+    *per_side("peak_net_ankle_torque_*", "peak net ankle torque, *", "N m",
+              "largest net plantarflexing ankle torque of stance",
+              lambda s, side: s.ankle_profile(side)[:, 1].max(), "peak, *", section=ANKLE,
+              part="stance", kept=False),
     *_extensor_measures(),
     *per_side("dorsiflexion_stiffness_*", "K_D *", "N m/rad", "K_D; `null` when barefoot",
               partial(_stiffness, first=0), "K_D, *", "K_D *", section=EFFORT),

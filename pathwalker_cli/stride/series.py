@@ -14,8 +14,35 @@ from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 
 
+class Sampled:
+    """What is known of every walk that was sampled at instants: who walked when, and how."""
+
+    walker: Walker
+    time: np.ndarray
+    q: np.ndarray
+
+    @property
+    def duration(self) -> float:
+        """Time that it takes [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def distance(self) -> float:
+        """Distance that it covers [m]."""
+        return float(self.q[-1, 0] - self.q[0, 0])
+
+    @cached_property
+    def contact_position(self) -> np.ndarray:
+        """Positions of the contact points, x and z [m], shape (n, 4, 2)."""
+        return np.array([self.walker.contact_points(q) for q in self.q])
+
+    def column(self, coordinate: str) -> np.ndarray:
+        """Return one generalised coordinate over time, shape (n,)."""
+        return np.asarray(self.q[:, self.walker.skeleton.index(coordinate)])
+
+
 @dataclass(frozen=True)
-class GaitSeries:
+class GaitSeries(Sampled):
     """One stride, n instants; SI units and radians, orders as in `conventions`.
 
     Args:
@@ -92,11 +119,6 @@ class GaitSeries:
         return self.walker.generalised_forces(self.element_force)
 
     @cached_property
-    def contact_position(self) -> np.ndarray:
-        """Positions of the contact points, x and z [m], shape (n, 4, 2)."""
-        return np.array([self.walker.contact_points(q) for q in self.q])
-
-    @cached_property
     def quadrature(self) -> np.ndarray:
         """Weights w [s] with sum(w * f) = integral of f over the stride, shape (n,).
 
@@ -107,20 +129,6 @@ class GaitSeries:
             steps = phase.duration * np.diff(phase.mesh)
             parts.append(np.outer(steps, quadrature_weights(phase.degree)[1]).ravel())
         return np.concatenate(parts)
-
-    @property
-    def duration(self) -> float:
-        """Time of the stride [s]."""
-        return float(self.time[-1])
-
-    @property
-    def distance(self) -> float:
-        """Distance of the stride [m]."""
-        return float(self.q[-1, 0] - self.q[0, 0])
-
-    def column(self, coordinate: str) -> np.ndarray:
-        """Return one generalised coordinate over time, shape (n,)."""
-        return np.asarray(self.q[:, self.walker.skeleton.index(coordinate)])
 
     def vertical_force(self, side: str) -> np.ndarray:
         """Return the vertical ground reaction force on a foot ("right", "left") [N], shape (n,)."""

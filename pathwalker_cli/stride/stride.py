@@ -16,7 +16,7 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion
-from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.series import GaitSeries, Sampled
 
 POINTS: Final = 101
 """Points of a normalised curve: one per cent each."""
@@ -39,7 +39,7 @@ class NotKnownError(LookupError):
 
 
 @dataclass(frozen=True)
-class Stride:
+class Stride(Sampled):
     """One stride, or the part of one that a recording shows, n instants.
 
     SI units and radians, orders as in `conventions`.  A predicted stride begins when the left toe
@@ -114,24 +114,9 @@ class Stride:
             raise ValueError("time must not decrease from row to row")
 
     @property
-    def duration(self) -> float:
-        """Time of the stride [s]."""
-        return float(self.time[-1] - self.time[0])
-
-    @property
-    def distance(self) -> float:
-        """Distance of the stride [m]."""
-        return float(self.q[-1, 0] - self.q[0, 0])
-
-    @property
     def walking_speed(self) -> float:
         """Distance over time [m/s]."""
         return self.distance / self.duration
-
-    @cached_property
-    def contact_position(self) -> np.ndarray:
-        """Positions of the contact points, x and z [m], shape (n, 4, 2)."""
-        return np.array([self.walker.contact_points(q) for q in self.q])
 
     def known(self, name: str) -> np.ndarray:
         """Return an array by its name.
@@ -171,10 +156,6 @@ class Stride:
     def toe_off(self, side: Side) -> float:
         """Return when the stance that begins with `strike` ends [s]; later than the strike."""
         return self.stance(side)[1]
-
-    def column(self, coordinate: str) -> np.ndarray:
-        """Return one generalised coordinate over time, shape (n,)."""
-        return np.asarray(self.q[:, COORDINATES.index(coordinate)])
 
     def stands(self, side: Side) -> np.ndarray:
         """Return whether heel or toe of a side is on the ground, shape (n,)."""
@@ -257,12 +238,6 @@ def stride_of(
     series: GaitSeries, name: str = "", problem: str = "", notes: tuple[str, ...] = ()
 ) -> Stride:
     """Return the stride that the solver found.
-
-    Args:
-        series: Its time series.
-        name: What to call it.
-        problem: The problem that it solves.
-        notes: What to know about it.
 
     Raises:
         DataError: If the motion is not one stride in the eight phases.

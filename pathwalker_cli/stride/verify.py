@@ -123,12 +123,7 @@ def second_engine_residual(series: GaitSeries) -> float:
 
 
 def equation_residual(series: GaitSeries, walker: Walker) -> float:
-    """Return the largest violation of the equations of motion by a walker's own back end [N, N m].
-
-    Args:
-        series: The stride.
-        walker: The same walker, of any back end.
-    """
+    """Return how far a walker's own back end misses the equations of motion at most [N, N m]."""
     body, n = walker.rigid_body, walker.skeleton.size
     q, v, vdot, force = (ca.SX.sym(name, k) for name, k in (("q", n), ("v", n), ("a", n), ("f", 8)))
     theta = ca.DM(body.parameters)

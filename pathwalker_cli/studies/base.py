@@ -19,7 +19,7 @@ from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.atomic import check_room, sweep
 from pathwalker_cli.io.fields import YamlModel
 from pathwalker_cli.io.lock import locked
-from pathwalker_cli.results.run_folder import Run, load_run
+from pathwalker_cli.results.run_folder import Run, load_converged, load_run
 from pathwalker_cli.studies.run import RunLog, done_run, run_study
 
 _TRANSCRIPTION: Final = "collocation"
@@ -113,10 +113,6 @@ class StudyKind(Generic[Study, Result]):
     def require(self, config: StudyConfig, where: str) -> None:
         """Refuse a problem that the study cannot take.
 
-        Args:
-            config: The problem.
-            where: Where it comes from, for the message.
-
         Raises:
             ConfigError: If it lacks what is varied, or its neighbours cannot be solved.
         """
@@ -198,22 +194,14 @@ def planned(
 
 
 def _given(study: NeighbourStudy, folder: Path) -> Run:
-    """Return the run that was named.
-
-    Raises:
-        ConfigError: If the study overrides values of the base.
-        DataError: If the run cannot be used.
-    """
+    """Return the run that was named."""
     if study.set:
         raise ConfigError(
             "overrides values of the base, but --run brings a config of its own",
             where="set",
             mend="leave one of the two out",
         )
-    try:
-        return load_run(folder)
-    except NotConvergedError as error:
-        raise DataError(str(error), where="--run", allowed="a converged run") from None
+    return load_converged(folder, "--run")
 
 
 def base_run(case: Case, folder: Path, log: RunLog | None = None) -> Run:
@@ -241,11 +229,6 @@ def resolver_of(run: Run, tolerance: float | None = None) -> Resolver:
 
 def require_optimum(resolver: Resolver, run: Run, tolerance: float) -> Optimum:
     """Return the optimum around which a resolver solves neighbours.
-
-    Args:
-        resolver: The solver of neighbours of the run.
-        run: The run, for the message.
-        tolerance: Optimality tolerance of the solves, for the message.
 
     Raises:
         NotConvergedError: If the optimum cannot be solved to the tolerance.
@@ -286,12 +269,7 @@ def check_folder(folder: Path, entries: frozenset[str], command: str) -> None:
 
 @contextmanager
 def claimed_folder(folder: Path, entries: frozenset[str], command: str) -> Iterator[None]:
-    """Keep other processes out of the folder of a study, and tidy up after killed ones.
-
-    Args:
-        folder: Where results shall go; see `check_folder`.
-        entries: Names of all files and folders that the command writes there.
-        command: The command, for the message.
+    """Keep others out of the folder of a study, see `check_folder`, and tidy up after killed ones.
 
     Raises:
         DataError: If it cannot take the results, or another process is at work there.

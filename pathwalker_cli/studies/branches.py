@@ -264,7 +264,8 @@ class _Explorer(Generic[End]):
 
     def sweep(self, inwards: bool) -> bool:
         """Try points from neighbours on branches unknown to them; return whether any gained."""
-        limit = self.rules.jump * self._usual_distance()
+        distances = list(self._distances())
+        limit = self.rules.jump * float(np.median(distances)) if distances else 0.0
         gained = False
         for target in self.graph.outwards[:: -1 if inwards else 1]:
             for source in self.graph.neighbours[target]:
@@ -278,12 +279,8 @@ class _Explorer(Generic[End]):
             return False
         return all(self.rules.distance(from_[0].end, branch.end) > limit for branch in to)
 
-    def _usual_distance(self) -> float:
-        """Return the median distance of neighbours."""
-        distances = list(self._distances())
-        return float(np.median(distances)) if distances else 0.0
-
     def _distances(self) -> Iterator[float]:
+        """Yield how far neighbours lie apart."""
         for pair in self.graph.edges:
             one, other = (self.ranked(point) for point in pair)
             if one and other:

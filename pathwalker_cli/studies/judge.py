@@ -10,7 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.bounds import held
 from pathwalker_cli.gait.neighbourhood import Neighbourhood
@@ -34,9 +33,6 @@ _CANDIDATES: Final = 2
 
 def verdict_of(solution: GaitSolution) -> Verdict | None:
     """Return the verdict on an identification, solving its neighbourhood.
-
-    Args:
-        solution: A converged solution by collocation.
 
     Returns:
         None where there is no number to judge: nothing free to choose, half a cycle (where both
@@ -78,11 +74,6 @@ class _Judge:
         self.around = Neighbourhood(resolver)
         self.optimum = self.around.optimum
         self.solves = 0
-
-    @property
-    def config(self) -> StudyConfig:
-        """The config of the optimum."""
-        return self.optimum.config
 
     def number(self, unknown: Unknown) -> NumberVerdict:
         """Return the verdict on one number."""
@@ -133,7 +124,7 @@ class _Judge:
         self, values: Mapping[Unknown, float], start: Optimum | None = None, insist: bool = True
     ) -> Optimum:
         """Return the neighbour with some numbers prescribed."""
-        case = self.optimum.case.with_values(held(self.config, values))
+        case = self.optimum.case.with_values(held(self.optimum.config, values))
         return self.resolver.resolve(case, start, insist)
 
     def snapped(self) -> SnappedSprings | None:

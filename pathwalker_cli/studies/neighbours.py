@@ -147,11 +147,7 @@ class Neighbours:
         return optimum
 
     def solver(self, case_at: Callable[[Values], Case]) -> Solve[Optimum]:
-        """Return what solves the points of a graph.
-
-        Args:
-            case_at: Returns the case of the values of a point.
-        """
+        """Return what solves the points of a graph."""
         return lambda name, values, start: self.resolve(name, case_at(values), start)
 
 

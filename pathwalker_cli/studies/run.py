@@ -86,7 +86,8 @@ def run_study(
     inputs = run_inputs(case, warm_start)
     solution = _solve(case, earlier, log)
     verdict = verdict_of(solution) if case.config.verdict else None
-    lines = [*_log_lines(solution, inputs, log), *_verdict_lines(verdict)]
+    lines = _log_lines(solution, inputs, log)
+    lines += [f"{label}: {text}" for label, text in verdict_lines(verdict)] if verdict else []
     more = {"verdict": None if verdict is None else verdict.as_dict()}
     try:
         metrics = write_run(folder, solution, lines, inputs, more)
@@ -134,10 +135,6 @@ def _solve(case: Case, earlier: Run | None, log: RunLog) -> GaitSolution:
 
         return solve_from_starts(case, log.optimum)
     return GaitSolver(case, log).solve(motion)
-
-
-def _verdict_lines(verdict: Verdict | None) -> list[str]:
-    return [] if verdict is None else [f"{label}: {text}" for label, text in verdict_lines(verdict)]
 
 
 def _log_lines(solution: GaitSolution, inputs: RunInputs, log: RunLog) -> list[str]:

@@ -9,12 +9,10 @@ from typing import Any, Final
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
+from pathwalker_cli.conventions import STIFFNESSES, to_degrees
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.solution import LocalOptimum
 from pathwalker_cli.io.refusals import dotted
-from pathwalker_cli.model.elements.orthosis import AnkleOrthosis
-from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.results.text import angle_words
 from pathwalker_cli.stride.measures import measure_of
 
@@ -193,14 +191,11 @@ def _renamed(plain: Any) -> Any:
             for old, new in (("spring", "name"), ("stiffness", "value")):
                 if old in entry:
                     entry[new] = entry.pop(old)
-            entry["label"] = entry["label"] or _spring_label(str(entry.get("name")))
+            name = str(entry.get("name"))
+            known = measure_of(name).label if name in STIFFNESSES else name
+            entry["label"] = entry["label"] or known
         springs.append(entry)
     return {"numbers": [], **plain, "springs": springs}
-
-
-def _spring_label(name: str) -> str:
-    known = {n.full_name: n for side in SIDES for n in AnkleOrthosis(side).numbers[:2]}
-    return Unknown.of(known[name]).label if name in known else name
 
 
 def _contradiction(verdict: Verdict) -> str:
@@ -311,7 +306,8 @@ def reservations(number: NumberVerdict) -> Iterator[str]:
     if number.limit:
         words = {"N m/rad": _SOFTER, "rad": _TURNED}
         word, sign = words.get(_unit(number), _LESS)[number.limit]
-        step = _noticeable(number)
+        # what makes a difference to a hand: a tenth of the number, or a degree
+        step = float(np.deg2rad(1.0)) if number.unit == "rad" else 0.1 * abs(number.value)
         saved = -100.0 * sign * number.gradient * step
         yield (
             f"it sits at the {number.limit} limit: {shown(step, _unit(number), second=False)} "
@@ -319,11 +315,6 @@ def reservations(number: NumberVerdict) -> Iterator[str]:
         )
     if not number.certain:
         yield "the ends of this region are not certain: the problems beyond did not converge"
-
-
-def _noticeable(number: NumberVerdict) -> float:
-    """Return a step that makes a difference to a hand: a tenth of the number, or a degree."""
-    return float(np.deg2rad(1.0)) if number.unit == "rad" else 0.1 * abs(number.value)
 
 
 def stop_text(stop: StopVerdict) -> str:

@@ -98,9 +98,6 @@ class Verification:
 def verify_run(folder: str | Path) -> Verification:
     """Check a run from its files alone.
 
-    Args:
-        folder: The folder of a converged run.
-
     Raises:
         DataError: If it is no run folder, or a file of it is missing, damaged or foreign.
         NotConvergedError: If the run did not converge.

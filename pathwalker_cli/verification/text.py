@@ -25,15 +25,11 @@ def _line(check: Check) -> str:
     if check.value is None:
         return f" -       {check.name:<26}{check.note}"
     state = "ok" if check.passed else "FAILED"
-    amount = _amount(check)
+    amount = f"{check.value:.1e} of {check.limit:.0e} {check.unit}"
+    if check.limit == 0.0:
+        amount = "as written" if check.passed else ""
     note = f"  {check.note}" if check.note and not check.passed else ""
     return f" {state:<8}{check.name:<26}{amount}{note}".rstrip()
-
-
-def _amount(check: Check) -> str:
-    if check.limit == 0.0:
-        return "as written" if check.passed else ""
-    return f"{check.value:.1e} of {check.limit:.0e} {check.unit}"
 
 
 def difference_lines(before: Run, after: Run) -> Iterator[str]:

@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side, to_degrees
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.elements.orthosis import OrthosisSide, orthosis_torque
+from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.curves import Reference
-from pathwalker_cli.stride.figures.style import (
-    LINE_COLOUR,
-    LINE_STYLE,
-    NEUTRAL,
-    dress,
-    legend,
-    new_figure,
-    zero_line,
-)
 from pathwalker_cli.stride.measures import ankle_torque_line
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import stride_of, toe_bearing
@@ -35,48 +24,39 @@ def orthosis_curves(series: GaitSeries, reference: Reference | None = None) -> F
 
     Dorsiflexion is positive, and so is the torque with which the orthosis resists it.
 
-    Args:
-        series: The stride, with orthoses.
-        reference: Not used: the torque of an orthosis is not recorded.
-
     Raises:
         InputError: If the walker wears no orthoses.
     """
     if series.walker.orthosis is None:
         raise InputError("a barefoot walker has no orthosis curve", allowed="condition orthosis")
-    fig = new_figure(2.4)
+    fig = style.new_figure(2.4)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
     for i, (ax, side) in enumerate(zip(panels, SIDES, strict=True)):
         _draw_orthosis(ax, series, side, series.walker.orthosis[i])
-        dress(ax, _title(series, side), _ANGLE, _TORQUE if i == 0 else "")
-    legend(
-        fig,
-        [
-            Line2D([], [], color=NEUTRAL, linewidth=0.8, label="curve"),
-            Line2D([], [], color=NEUTRAL, linewidth=3.0, alpha=0.5, label="part that was walked"),
-            Line2D([], [], color=NEUTRAL, linewidth=0.8, linestyle="-.", label="stop"),
-        ],
-    )
+        style.dress(ax, _title(series, side), _ANGLE, _TORQUE if i == 0 else "")
+    curve, stop = style.entry("curve", linewidth=0.8), {"linewidth": 0.8, "linestyle": "-."}
+    walked = style.entry("part that was walked", linewidth=3.0, alpha=0.5)
+    style.legend(fig, [curve, walked, style.entry("stop", **stop)])
     return fig
 
 
 def _draw_orthosis(ax: Axes, series: GaitSeries, side: Side, orthosis: OrthosisSide) -> None:
     """Draw curve, walked part, stops and stiffness of one orthosis."""
-    i, colour = SIDES.index(side), LINE_COLOUR[side]
+    i, colour = SIDES.index(side), style.LINE_COLOUR[side]
     k_d, k_p = float(series.stiffness[i]), float(series.stiffness[i + 2])
     angle = series.column(f"ankle_{SUFFIX[side]}")
     stops = (orthosis.dorsiflexion_stop, orthosis.plantarflexion_stop)
     low, high = min(*stops, angle.min()) - 0.03, max(*stops, angle.max()) + 0.03
-    zero_line(ax)
+    style.zero_line(ax)
     for ends, look in (
-        ((low, high), {"linewidth": 0.8, "linestyle": LINE_STYLE[side]}),
+        ((low, high), {"linewidth": 0.8, "linestyle": style.LINE_STYLE[side]}),
         ((angle.min(), angle.max()), {"linewidth": 3.5, "alpha": 0.4}),
     ):
         span = np.linspace(*ends, 300)
         torque = np.asarray(orthosis_torque(orthosis, span, k_d, k_p)).ravel()
         ax.plot(-to_degrees(span), torque, color=colour, **look)
     for stop in stops:
-        ax.axvline(-float(to_degrees(stop)), color=NEUTRAL, linewidth=0.8, linestyle="-.")
+        ax.axvline(-float(to_degrees(stop)), color=style.NEUTRAL, linewidth=0.8, linestyle="-.")
 
 
 def _title(series: GaitSeries, side: Side) -> str:
@@ -94,24 +74,16 @@ def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figu
 
     Dorsiflexion is positive, and so is the plantarflexing torque of muscles and orthosis.  The
     slope is that of `ankle_profile.ankle_torque_slope`, over the thick part of the path.
-
-    Args:
-        series: The stride.
-        reference: Not used.
     """
-    fig = new_figure(2.4)
+    fig = style.new_figure(2.4)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
     for i, (ax, side) in enumerate(zip(panels, SIDES, strict=True)):
         _draw_profile(ax, series, side)
-        dress(ax, f"{side.capitalize()} ankle", _ANGLE, _TORQUE if i == 0 else "")
-    legend(
-        fig,
-        [
-            Line2D([], [], color=NEUTRAL, linewidth=1.6, label="foot flat or on its toe"),
-            Line2D([], [], color=NEUTRAL, linewidth=0.6, label="swing and heel contact"),
-            Line2D([], [], color="black", linewidth=0.8, linestyle=":", label="mean slope"),
-        ],
-    )
+        style.dress(ax, f"{side.capitalize()} ankle", _ANGLE, _TORQUE if i == 0 else "")
+    bearing = style.entry("foot flat or on its toe", linewidth=1.6)
+    other = style.entry("swing and heel contact", linewidth=0.6)
+    slope = style.entry("mean slope", color="black", linewidth=0.8, linestyle=":")
+    style.legend(fig, [bearing, other, slope])
     return fig
 
 
@@ -120,12 +92,9 @@ def _draw_profile(ax: Axes, series: GaitSeries, side: Side) -> None:
     name = f"ankle_{SUFFIX[side]}"
     angle = -series.column(name)
     torque = series.net_torque[:, COORDINATES.index(name)]
-    bearing, (slope, offset) = (
-        toe_bearing(series.phase, side),
-        ankle_torque_line(stride_of(series), side),
-    )
-    look: dict[str, Any] = {"color": LINE_COLOUR[side], "linestyle": LINE_STYLE[side]}
-    zero_line(ax)
+    bearing, look = toe_bearing(series.phase, side), style.side_line(side)
+    slope, offset = ankle_torque_line(stride_of(series), side)
+    style.zero_line(ax)
     ax.plot(to_degrees(angle), torque, linewidth=0.6, **look)
     thick = np.where(bearing, torque, np.nan)
     ax.plot(to_degrees(angle), thick, linewidth=1.6, **look)

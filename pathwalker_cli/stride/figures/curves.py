@@ -1,18 +1,20 @@
-"""Curves over the gait cycle of each side, the recorded range behind them and clinical signs."""
+"""What is drawn over the gait cycle of a side: angles, forces, moments and activations.
+
+Flexion, dorsiflexion and forward lean are positive angles, as gait laboratories plot them; moments
+are internal ones, extension and plantarflexion positive.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
-from matplotlib.axes import Axes
 
-from pathwalker_cli.conventions import SIDES, Side
-from pathwalker_cli.stride.figures.style import LINE_COLOUR, LINE_STYLE, toe_off_line
-from pathwalker_cli.stride.series import GaitSeries
-from pathwalker_cli.stride.stride import own_cycle
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, LEG_JOINTS, SUFFIX, Side, to_degrees
+from pathwalker_cli.model.walker import Walker
+from pathwalker_cli.stride.stride import NotKnownError, Stride
 
 CLINICAL_ANGLE: Final = {"hip": -1.0, "knee": 1.0, "ankle": -1.0}
 """Sign that makes flexion and dorsiflexion angles positive, as clinicians plot them."""
@@ -65,36 +67,114 @@ class Reference:
     forces: Mapping[str, Band] = field(default_factory=dict)
 
 
-def draw_band(ax: Axes, band: Band | None, side: Side, factor: float) -> None:
-    """Draw a recorded band in the unit of the panel.
+@dataclass(frozen=True)
+class CycleCurve:
+    """A quantity over the gait cycle of a side.
 
     Args:
-        ax: The panel.
-        band: The band; nothing is drawn without one.
-        side: Its side.
-        factor: From the band's unit and sign to the panel's.
+        key: Its name in files.
+        name: Its name for people, e.g. "hip".
+        label: Label of the y axis with its unit.
+        raw: Its columns of a stride, SI units and signs of `conventions`, shape (n, m).
+        factor: From these to the unit and the sign of the label; of a walker.
+        midline: Whether it belongs to no side, so that the title names the cycle.
+        zero: Whether zero is of interest.
+        least_in_stance: Whether a dot marks the least value of stance.
     """
-    if band is None:
-        return
-    colour, style = LINE_COLOUR[side], LINE_STYLE[side]
-    low, high = sorted((factor * band.low, factor * band.high), key=lambda values: values.mean())
-    ax.fill_between(band.percent, low, high, color=colour, alpha=0.15, linewidth=0)
-    for edge in (low, high):  # so that the ranges of both sides differ without colour too
-        ax.plot(band.percent, edge, color=colour, linestyle=style, linewidth=0.4, alpha=0.6)
-    mean = factor * band.mean
-    ax.plot(band.percent, mean, color=colour, linestyle=style, linewidth=0.7, alpha=0.6)
+
+    key: str
+    name: str
+    label: str
+    raw: Callable[[Stride, Side], np.ndarray]
+    factor: Callable[[Walker], Any]
+    midline: bool = False
+    zero: bool = True
+    least_in_stance: bool = False
+
+    def title(self, side: Side) -> str:
+        """Return the title of the panel of a side."""
+        return (
+            f"{self.name}, {side} cycle" if self.midline else f"{side} {self.name}"
+        ).capitalize()
+
+    def columns(self, stride: Stride, side: Side) -> np.ndarray:
+        """Return its columns of a stride in the unit of the label, shape (n, m).
+
+        Raises:
+            NotKnownError: If the stride does not know them.
+        """
+        return np.asarray(self.factor(stride.walker) * self.raw(stride, side))
+
+    def lines(self, stride: Stride, side: Side, points: int) -> np.ndarray:
+        """Return its curves over the cycle of a side, (m, points); none if they are not known."""
+        try:
+            curves = stride.over_cycle(self.columns(stride, side), side, points).T
+        except NotKnownError:
+            return np.empty((0, points))
+        return curves if np.isfinite(curves).all() else np.empty((0, points))
 
 
-def draw_sides(ax: Axes, series: GaitSeries, values: Mapping[Side, np.ndarray]) -> None:
-    """Draw a quantity of both sides over their own gait cycles and mark the toe-offs.
+def _angle(joint: str, name: str, label: str) -> CycleCurve:
+    factor = CLINICAL_ANGLE.get(joint, 1.0) * float(to_degrees(1.0))
+    midline = joint not in CLINICAL_ANGLE
 
-    Args:
-        ax: The panel.
-        series: The stride.
-        values: Per side, shape (n,), in the unit of the panel.
-    """
-    for side in SIDES:
-        cycle = own_cycle(series, side)
-        curve = values[side][cycle.index]
-        ax.plot(cycle.percent, curve, color=LINE_COLOUR[side], linestyle=LINE_STYLE[side])
-        toe_off_line(ax, cycle)
+    def raw(stride: Stride, side: Side) -> np.ndarray:
+        return stride.column(joint if midline else f"{joint}_{SUFFIX[side]}")[:, None]
+
+    knee = joint == "knee"  # it is never straight
+    return CycleCurve(f"angle_{joint}", name, label, raw, lambda _: factor, midline, not knee, knee)
+
+
+def _force(key: str, axis: int, name: str) -> CycleCurve:
+    def raw(stride: Stride, side: Side) -> np.ndarray:
+        return stride.foot_force(side)[:, [axis]]
+
+    return CycleCurve(key, name, "force [% body weight]", raw, lambda w: 100.0 / w.weight)
+
+
+def _moment(joint: str, label: str) -> CycleCurve:
+    def raw(stride: Stride, side: Side) -> np.ndarray:
+        return stride.known("net_torque")[:, [COORDINATES.index(f"{joint}_{SUFFIX[side]}")]]
+
+    return CycleCurve(
+        f"moment_{joint}", f"{joint} moment", label, raw, lambda w: EXTENSION[joint] / w.total_mass
+    )
+
+
+def _activation(joint: str, up: str, down: str) -> CycleCurve:
+    """Return the activation of an antagonistic pair: one upward, the other downward."""
+    midline = joint not in LEG_JOINTS
+
+    def raw(stride: Stride, side: Side) -> np.ndarray:
+        suffix = "" if midline else f"_{SUFFIX[side]}"
+        rows = [GENERATORS.index(f"{joint}_{way}{suffix}") for way in (up, down)]
+        return stride.known("activation")[:, rows]
+
+    name, ways = ("trunk", "ext. +, bend -") if midline else (joint, "ext. +, flex. -")
+    both = np.array([1.0, -1.0])
+    return CycleCurve(
+        f"activation_{joint}", f"{name} muscles", f"{ways} [1]", raw, lambda _: both, midline
+    )
+
+
+ANGLES: Final = (
+    _angle("pelvis_tilt", "pelvis", "forward tilt [deg]"),
+    _angle("hip", "hip", "flexion [deg]"),
+    _angle("knee", "knee", "flexion [deg]"),
+    _angle("ankle", "ankle", "dorsiflexion [deg]"),
+    _angle("lumbar", "trunk", "forward lean [deg]"),
+)
+FORCES: Final = (
+    _force("force_vertical", 1, "vertical force"),
+    _force("force_forward", 0, "fore-aft force"),
+)
+MOMENTS: Final = (
+    _moment("hip", "extension [N m/kg]"),
+    _moment("knee", "extension [N m/kg]"),
+    _moment("ankle", "plantarflexion [N m/kg]"),
+)
+# `lumbar_flexion` extends the trunk, see `conventions.GENERATORS`.
+ACTIVATIONS: Final = (
+    *(_activation(joint, "extension", "flexion") for joint in LEG_JOINTS),
+    _activation("lumbar", "flexion", "extension"),
+)

@@ -10,12 +10,14 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from pathwalker_cli.io.atomic import atomic_path
-from pathwalker_cli.stride.figures.activations import activations
 from pathwalker_cli.stride.figures.ankle import ankle_torque, orthosis_curves
 from pathwalker_cli.stride.figures.curves import Reference
-from pathwalker_cli.stride.figures.ground_forces import ground_forces
-from pathwalker_cli.stride.figures.joint_angles import joint_angles
-from pathwalker_cli.stride.figures.joint_moments import joint_moments
+from pathwalker_cli.stride.figures.cycles import (
+    activations,
+    ground_forces,
+    joint_angles,
+    joint_moments,
+)
 from pathwalker_cli.stride.figures.stick_figures import stick_figures
 from pathwalker_cli.stride.figures.style import STYLE
 from pathwalker_cli.stride.series import GaitSeries
@@ -51,49 +53,26 @@ def figure_names(series: GaitSeries) -> tuple[str, ...]:
 
 
 def make_figure(name: str, series: GaitSeries, reference: Reference | None = None) -> Figure:
-    """Return a figure in the common style.
-
-    Args:
-        name: A key of `FIGURES`.
-        series: The stride.
-        reference: Recorded bands to draw behind.
-    """
+    """Return a figure in the common style."""
     with mpl.rc_context(STYLE):
         return FIGURES[name](series, reference)
 
 
 def save_figures(
-    series: GaitSeries,
-    folder: str | Path,
-    reference: Reference | None = None,
-    formats: Sequence[str] = FORMATS,
+    series: GaitSeries, folder: str | Path, reference: Reference | None = None
 ) -> tuple[str, ...]:
-    """Save every figure of a stride and return the file names.
-
-    Args:
-        series: The stride.
-        folder: Where; made if it does not exist.
-        reference: Recorded bands to draw behind.
-        formats: "png", "svg" or both.
-    """
+    """Save every figure of a stride over recorded bands; return the file names."""
     return tuple(
         file
         for name in figure_names(series)
-        for file in save_formats(make_figure(name, series, reference), folder, name, formats)
+        for file in save_formats(make_figure(name, series, reference), folder, name)
     )
 
 
 def save_formats(
     figure: Figure, folder: str | Path, name: str, formats: Sequence[str] = FORMATS
 ) -> tuple[str, ...]:
-    """Save a figure in several formats and return the file names.
-
-    Args:
-        figure: A figure made under `style.STYLE`.
-        folder: Where; made if it does not exist.
-        name: Name of the files without extension.
-        formats: "png", "svg" or both.
-    """
+    """Save a figure made under `style.STYLE` as PNG, SVG or both; return the file names."""
     Path(folder).mkdir(parents=True, exist_ok=True)
     files = tuple(f"{name}.{extension}" for extension in formats)
     for file in files:
@@ -102,12 +81,7 @@ def save_formats(
 
 
 def save_figure(figure: Figure, path: str | Path) -> None:
-    """Save a figure in one stroke; its layout is settled by the first format.
-
-    Args:
-        figure: A figure made under `style.STYLE`.
-        path: The file, ".png" or ".svg".
-    """
+    """Save a figure in one stroke; its layout is settled by the first format."""
     path = Path(path)
     extension = path.suffix.removeprefix(".")
     with mpl.rc_context(STYLE), atomic_path(path) as temporary:

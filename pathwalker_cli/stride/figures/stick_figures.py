@@ -7,20 +7,11 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from pathwalker_cli.conventions import SIDES, SUFFIX, Side
+from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.curves import Reference
-from pathwalker_cli.stride.figures.style import (
-    BODY_COLOUR,
-    FORCE_COLOUR,
-    FORCE_LENGTH,
-    NEUTRAL,
-    dress,
-    legend,
-    new_figure,
-)
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import body_points, centre_of_pressure, loaded, stride_of
 
@@ -29,34 +20,19 @@ _ROWS: Final = ((0, 10, 20, 30, 40), (50, 60, 70, 80, 90))
 _SPACING: Final = 1.05
 """Distance from figure to figure, as a share of the pelvis height."""
 _LEG_LOOK: Final[dict[Side, dict[str, Any]]] = {
-    "right": {"color": BODY_COLOUR["right"], "linestyle": "-", "linewidth": 1.3, "zorder": 3},
-    "left": {"color": BODY_COLOUR["left"], "linestyle": "--", "linewidth": 1.1, "zorder": 2},
+    "right": {"color": style.BODY_COLOUR["right"], "linestyle": "-", "linewidth": 1.3, "zorder": 3},
+    "left": {"color": style.BODY_COLOUR["left"], "linestyle": "--", "linewidth": 1.1, "zorder": 2},
 }
 
 
 def stick_figures(series: GaitSeries, reference: Reference | None = None) -> Figure:
-    """Return ten stick figures over the right gait cycle with their ground reaction forces.
-
-    Args:
-        series: The stride.
-        reference: Not used.
-    """
-    fig = new_figure(3.5)
+    """Return ten stick figures over the right gait cycle with their ground reaction forces."""
+    fig = style.new_figure(3.5)
     for ax, row in zip(fig.subplots(2, 1), _ROWS, strict=True):
         _draw_row(ax, series, row)
-    legend(
-        fig,
-        [
-            *(Line2D([], [], label=f"{s} leg", **_LEG_LOOK[s]) for s in SIDES),
-            Line2D(
-                [],
-                [],
-                color=FORCE_COLOUR,
-                linewidth=1.4,
-                label=f"ground force; 1 body weight is as\nlong as {FORCE_LENGTH:g} pelvis heights",
-            ),
-        ],
-    )
+    force = f"ground force; 1 body weight is as\nlong as {style.FORCE_LENGTH:g} pelvis heights"
+    legs = (style.entry(f"{side} leg", **_LEG_LOOK[side]) for side in SIDES)
+    style.legend(fig, [*legs, style.entry(force, color=style.FORCE_COLOUR, linewidth=1.4)])
     return fig
 
 
@@ -67,8 +43,8 @@ def _draw_row(ax: Axes, series: GaitSeries, row: tuple[int, ...]) -> None:
     for slot, percent in zip(slots, row, strict=True):
         _draw_instant(ax, series, percent, slot, height)
     margin = height * _SPACING / 2
-    ax.axhline(0.0, color=NEUTRAL, linewidth=0.8, zorder=1)
-    dress(ax, x="right gait cycle [%], figures moved apart", y="height [m]")
+    ax.axhline(0.0, color=style.NEUTRAL, linewidth=0.8, zorder=1)
+    style.dress(ax, x="right gait cycle [%], figures moved apart", y="height [m]")
     ax.set_xlim(slots[0] - margin, slots[-1] + margin)
     ax.set_ylim(-0.06 * height, 2.0 * height)
     ax.set_xticks(slots, [f"{percent}" for percent in row])
@@ -84,12 +60,13 @@ def _draw_instant(ax: Axes, series: GaitSeries, percent: float, slot: float, hei
     shift = np.array([slot - q[0], 0.0])
     _draw_body(ax, {n: p + shift for n, p in body_points(series.walker, q).items()})
     row = int(np.argmin(np.abs(series.time - time)))
-    scale = FORCE_LENGTH * height / series.walker.weight
+    scale = style.FORCE_LENGTH * height / series.walker.weight
     for side in SIDES:
         if loaded(series, side)[row]:
             x = centre_of_pressure(series, side)[row] - series.q[row, 0] + slot
             force = (series.forward_force(side)[row], series.vertical_force(side)[row])
-            _draw_force(ax, x, scale * np.array(force))
+            ax.quiver([x], [0.0], [scale * force[0]], [scale * force[1]], color=style.FORCE_COLOUR,
+                      angles="xy", scale_units="xy", scale=1.0, width=0.006, zorder=5)  # fmt: skip
 
 
 def _draw_body(ax: Axes, points: dict[str, np.ndarray]) -> None:
@@ -99,12 +76,11 @@ def _draw_body(ax: Axes, points: dict[str, np.ndarray]) -> None:
         _draw_chain(ax, points, ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}"), look)
         foot = (f"ankle_{s}", f"heel_{s}", f"toe_{s}", f"ankle_{s}")
         _draw_chain(ax, points, foot, look | {"linewidth": 0.8})
-    trunk = {"color": BODY_COLOUR["right"], "linewidth": 1.6, "zorder": 4}
+    trunk = {"color": style.BODY_COLOUR["right"], "linewidth": 1.6, "zorder": 4}
     _draw_chain(ax, points, ("lumbar", "neck"), trunk)
     radius = float(np.linalg.norm(points["head"] - points["neck"]))
-    ax.add_patch(
-        Circle(tuple(points["head"]), radius, fill=False, color=BODY_COLOUR["right"], linewidth=0.9)
-    )
+    outline = {"fill": False, "color": style.BODY_COLOUR["right"], "linewidth": 0.9}
+    ax.add_patch(Circle(tuple(points["head"]), radius, **outline))
 
 
 def _draw_chain(
@@ -113,19 +89,3 @@ def _draw_chain(
     """Draw a line from point to point."""
     x, z = np.array([points[name] for name in names]).T
     ax.plot(x, z, **look)
-
-
-def _draw_force(ax: Axes, x: float, arrow: np.ndarray) -> None:
-    """Draw a ground reaction force as an arrow from the ground at x."""
-    ax.quiver(
-        [x],
-        [0.0],
-        [arrow[0]],
-        [arrow[1]],
-        color=FORCE_COLOUR,
-        angles="xy",
-        scale_units="xy",
-        scale=1.0,
-        width=0.006,
-        zorder=5,
-    )

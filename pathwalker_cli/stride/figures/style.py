@@ -79,10 +79,14 @@ def percent_axis(ax: Axes, label: str = "own gait cycle [%]") -> None:
     ax.set_xlabel(label)
 
 
+def side_line(side: Side) -> dict[str, Any]:
+    """Return colour and style of the lines of a side."""
+    return {"color": LINE_COLOUR[side], "linestyle": LINE_STYLE[side]}
+
+
 def toe_off_line(ax: Axes, cycle: OwnCycle) -> None:
     """Mark the toe-off of a side, thin in the line style of the side."""
-    side = cycle.side
-    ax.axvline(cycle.toe_off, linewidth=0.6, color=LINE_COLOUR[side], linestyle=LINE_STYLE[side])
+    ax.axvline(cycle.toe_off, linewidth=0.6, **side_line(cycle.side))
 
 
 def zero_line(ax: Axes) -> None:
@@ -90,14 +94,19 @@ def zero_line(ax: Axes) -> None:
     ax.axhline(0.0, color=NEUTRAL, linewidth=0.6)
 
 
+def entry(label: str, **look: Any) -> Artist:
+    """Return the legend entry of a line or a mark, grey if its look does not say otherwise."""
+    return Line2D([], [], label=label, **{"color": NEUTRAL, **look})
+
+
 def side_handles() -> list[Artist]:
     """Return the legend entries of the two sides."""
-    return [Line2D([], [], color=LINE_COLOUR[s], linestyle=LINE_STYLE[s], label=s) for s in SIDES]
+    return [entry(side, **side_line(side)) for side in SIDES]
 
 
 def events_handle() -> Artist:
     """Return the legend entry of the toe-off marks."""
-    return Line2D([], [], color=NEUTRAL, linewidth=0.6, label="upright: toe-off")
+    return entry("upright: toe-off", linewidth=0.6)
 
 
 def side_look(name: str) -> tuple[str, str]:

@@ -15,7 +15,6 @@ from pathwalker_cli.errors import ConfigError, InputError, PatientError, placed
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.recorded import recorded_passage, recorded_stride, start_recording
 from pathwalker_cli.gait.symmetry import require_symmetry
-from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.patient import Patient, load_patient, shipped_patients
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.results.run_folder import warm_start_run
@@ -58,12 +57,7 @@ class BatchCase:
 
 @dataclass(frozen=True)
 class Batch:
-    """A study of many cases, checked.
-
-    Args:
-        name: Its name: that of its file.
-        cases: The cases in order.
-    """
+    """A study of many cases, checked; its name is that of its file."""
 
     name: str
     cases: tuple[BatchCase, ...]
@@ -71,10 +65,6 @@ class Batch:
 
 def load_cases(path: str | Path, changes: tuple[str, ...] = ()) -> Batch:
     """Read a study and check every case before the first is solved.
-
-    Args:
-        path: The YAML file, or the name of a shipped one.
-        changes: Overrides "key=value" of the study's own keys.
 
     Raises:
         InputError: If study, patient, config, warm start or a combination of them is wrong.
@@ -137,11 +127,7 @@ def _variants(study: BatchStudy, problem: str, base: Case, where: str) -> Iterat
 def _check_new(
     case: BatchCase, cases: Mapping[str, BatchCase], known: dict[str, str], where: str
 ) -> None:
-    """Refuse a case whose name or content is there already.
-
-    Raises:
-        ConfigError: If there is such a case.
-    """
+    """Refuse a case whose name or content is there already."""
     content = case.study.config.model_dump_json()
     if case.name in cases or content in known:
         other = known.get(content, case.name)
@@ -231,11 +217,6 @@ def _files(path: Path) -> list[Path]:
 def listed_problems(entries: tuple[str, ...], folder: Path, where: str) -> dict[str, StudyConfig]:
     """Return the config of every problem by its name, which is that of its file.
 
-    Args:
-        entries: Names of shipped configs, or config files.
-        folder: Folder that they are relative to.
-        where: The study, for messages.
-
     Raises:
         ConfigError: If a config is missing or refused, or a name stands twice.
     """
@@ -263,21 +244,26 @@ def listed_problems(entries: tuple[str, ...], folder: Path, where: str) -> dict[
 def check_case(name: str, case: Case, where: str) -> None:
     """Refuse a case that could not even begin.
 
-    Args:
-        name: Its name, for the message.
-        case: Config and patient.
-        where: The study, for the message.
-
     Raises:
         InputError: If the patient lacks what the problem needs, or a value does not fit.
     """
     config = case.config
     with placed(f"{where}, case {name}"):
         check_patient(case)
-        _check_starts(config)
+        if config.starts > 1:
+            raise ConfigError(
+                f"is {config.starts}",
+                where="starts",
+                allowed="1, as the cores belong to the cases",
+                mend="spread the starts as cases, e.g. grid: {start.knee_flexion: [0.5, 0.7, 0.9]}",
+            )
         walker = case.walker(config.model.backend)
         gait_bounds(walker, config.bounds, config.free)
-        _check_start(config, walker)
+        if config.half_cycle:
+            require_symmetry(walker)
+        if config.start.gait == "recorded":
+            recording = start_recording(walker, config.start)
+            (recorded_passage if config.fits else recorded_stride)(walker, recording)
 
 
 def check_patient(case: Case) -> None:
@@ -294,34 +280,6 @@ def check_patient(case: Case) -> None:
             mend="add the orthosis to the file, or choose a barefoot problem for this patient",
         )
     _ = patient.max_isometric_torque
-
-
-def _check_starts(config: StudyConfig) -> None:
-    """Refuse a config for several processes.
-
-    Raises:
-        ConfigError: If so.
-    """
-    if config.starts > 1:
-        raise ConfigError(
-            f"is {config.starts}",
-            where="starts",
-            allowed="1, as the cores belong to the cases",
-            mend="spread the starts as cases, e.g. grid: {start.knee_flexion: [0.5, 0.7, 0.9]}",
-        )
-
-
-def _check_start(config: StudyConfig, walker: Walker) -> None:
-    """Refuse half a cycle of unequal sides, and a recorded start without a recording.
-
-    Raises:
-        InputError: If so.
-    """
-    if config.half_cycle:
-        require_symmetry(walker)
-    if config.start.gait == "recorded":
-        recording = start_recording(walker, config.start)
-        (recorded_passage if config.fits else recorded_stride)(walker, recording)
 
 
 def check_warm_start(folder: Path, config: StudyConfig, where: str) -> None:

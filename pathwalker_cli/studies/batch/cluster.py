@@ -49,7 +49,8 @@ class DaskPool:
                     break
                 free = self._threads() - len(running)
                 for task in (waiting.popleft() for _ in range(min(free, len(waiting)))):
-                    running[self._submit(task, work)] = task.name
+                    arguments = (task.case, task.folder, task.warm_start)
+                    running[self._client.submit(work, *arguments, pure=False)] = task.name
                 for future in _ended(running):
                     yield running.pop(future), _result(future)
                     future.release()
@@ -65,10 +66,6 @@ class DaskPool:
             return max(1, sum(self._client.nthreads().values()))
         except OSError:
             return 1
-
-    def _submit(self, task: Task, work: Work) -> Any:
-        arguments = (task.case, task.folder, task.warm_start)
-        return self._client.submit(work, *arguments, pure=False)
 
 
 def _ended(running: Iterable[Any]) -> list[Any]:
@@ -157,11 +154,7 @@ def _client(address: str) -> Any:
 
 
 def _require(library: str) -> None:
-    """Refuse to go on without a library of the extra.
-
-    Raises:
-        BackendError: If it is not installed.
-    """
+    """Refuse to go on without a library of the extra."""
     from importlib.util import find_spec
 
     if find_spec(library) is None:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, get_args
+from typing import Annotated, Any, Final, get_args, get_origin
 
 from pydantic import BaseModel
 
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.csv_file import read_cells, write_table
-from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.io.fields import Quantity, is_model
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.results.tables import DIGITS
 from pathwalker_cli.stride.measures import measures_in
@@ -37,11 +37,7 @@ _PROOF: Final = {
 
 
 class CaseTable:
-    """Headers and rows of the cases of one study.
-
-    Args:
-        cases: All cases in order.
-    """
+    """Headers and rows of all cases of one study, in order."""
 
     def __init__(self, cases: Sequence[BatchCase]) -> None:
         self._named = any(case.variant for case in cases)
@@ -55,13 +51,7 @@ class CaseTable:
     def row(
         self, case: BatchCase, status: str, metrics: Mapping[str, Any] | None = None
     ) -> tuple[str, ...]:
-        """Return the row of a case.
-
-        Args:
-            case: The case.
-            status: "converged", or why not.
-            metrics: Content of the run's `metrics.json`; None if there is no run.
-        """
+        """Return the row of a case."""
         row = [case.name, case.patient, case.problem, *map(_varied, case.values.values())]
         row += [case.variant] if self._named else []
         return (*row, status, *numbers_of(status, metrics).values())
@@ -108,39 +98,28 @@ def unit_of(key: str) -> str:
             file.
     """
     block, kind, place = (*key.split(".", 2), "", "")[:3]
+    model: type[BaseModel] = StudyConfig
     if block == "variation" and place:
-        return _unit(Patient, place.split(".")) if kind == "shift" else "1"
-    return _unit(StudyConfig, key.split("."))
+        if kind != "shift":
+            return "1"
+        model, key = Patient, place
+    return next((q.unit or "1" for q in _quantities(model, (), key.split("."))), "")
 
 
-def _unit(annotation: Any, path: list[str]) -> str:
-    """Return the unit at a path below an annotation."""
-    quantity = next((a for a in getattr(annotation, "__metadata__", ()) if _is_quantity(a)), None)
-    if quantity is not None and not path:
-        return quantity.unit or "1"
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return _below(annotation, path)
-    inner = get_args(annotation)
-    steps = path[1:] if getattr(annotation, "__origin__", None) is dict else path
-    units = (_unit(argument, steps) for argument in inner)
-    return next((unit for unit in units if unit), "")
-
-
-def _below(model: type[BaseModel], path: list[str]) -> str:
-    """Return the unit at a path below a model; both sides of a body have the same."""
-    fields = model.model_fields
-    name, rest = (path[0], path[1:]) if path else ("right", [])
-    if name not in fields:
-        return ""
-    field = fields[name]
-    quantity = next((a for a in field.metadata if _is_quantity(a)), None)
-    if quantity is not None and not rest:
-        return quantity.unit or "1"
-    return _unit(field.annotation, rest)
-
-
-def _is_quantity(value: Any) -> bool:
-    return isinstance(value, Quantity)
+def _quantities(annotation: Any, metadata: Iterable[Any], path: list[str]) -> Iterator[Quantity]:
+    """Yield what is told of numbers at a path below an annotation; both sides have the same."""
+    if not path:
+        yield from (entry for entry in metadata if isinstance(entry, Quantity))
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if is_model(annotation):
+        name, *rest = path or ["right"]
+        if (field := annotation.model_fields.get(name)) is not None:
+            yield from _quantities(field.annotation, field.metadata, rest)
+    elif origin is Annotated:
+        yield from _quantities(parts[0], parts[1:], path)
+    else:
+        for part in parts:
+            yield from _quantities(part, (), path[1:] if origin is dict else path)
 
 
 CASES: Final = "cases"
@@ -181,12 +160,7 @@ class Ended:
 
 
 class Ledger:
-    """Rows of all cases, in memory and in the folder of the study.
-
-    Args:
-        cases: All cases in order.
-        folder: Full path of the study's folder.
-    """
+    """Rows of all cases, in order, in memory and in the folder of the study."""
 
     def __init__(self, cases: Sequence[BatchCase], folder: Path) -> None:
         self._cases = {case.name: case for case in cases}

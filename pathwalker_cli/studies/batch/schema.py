@@ -85,10 +85,6 @@ def flat(values: Mapping[str, Any]) -> dict[str, Any]:
 def load_batch(path: str | Path, changes: tuple[str, ...] = ()) -> tuple[BatchStudy, Path]:
     """Read a study of many cases; return it and the file that it stands in.
 
-    Args:
-        path: The YAML file, or the name of a shipped one.
-        changes: Overrides "key=value" of the study's own keys, as from the command line.
-
     Raises:
         ConfigError: If file or overrides are wrong.
     """

@@ -30,12 +30,7 @@ class Watch:
 
 @dataclass(frozen=True)
 class Report:
-    """How a study ended.
-
-    Args:
-        folder: Its folder.
-        ended: How every case ended, in order.
-    """
+    """How a study ended: its folder, and every case in order."""
 
     folder: Path
     ended: tuple[Ended, ...]
@@ -51,13 +46,6 @@ def run_batch(
 ) -> Report:
     """Solve all cases that are not solved yet, each into its run folder, and keep the table.
 
-    Args:
-        cases: The cases in order.
-        folder: Folder of the study.
-        pool: Who solves them.
-        watch: Hears of every case.
-        work: Solves one case.
-
     Raises:
         DataError: If the folder holds something else, or another process is at work there.
         NotConvergedError: If the user stopped it.
@@ -70,7 +58,10 @@ def run_batch(
         release_runs(place / CASES)
         waiting = ledger.recall()
         watch.begin(len(cases), len(cases) - len(waiting), pool.workers)
-        tasks = [_task(case, ledger.run_folder(case)) for case in waiting]
+        tasks = [
+            Task(c.name, c.study, str(ledger.run_folder(c)), str(c.warm_start or ""))
+            for c in waiting
+        ]
         try:
             for name, result in pool.run(tasks, work) if tasks else ():
                 watch.ended(ledger.record(name, result))
@@ -83,12 +74,6 @@ def run_batch(
         finally:
             release_runs(place / CASES)
     return Report(folder, ledger.ended)
-
-
-def _task(case: BatchCase, folder: Path) -> Task:
-    """Return a case as it travels."""
-    start = "" if case.warm_start is None else str(case.warm_start)
-    return Task(case.name, case.study, str(folder), start)
 
 
 _SHOWN: Final = 30

@@ -161,12 +161,7 @@ class LocalPool:
             yield name, failure(LOST, detail)
 
     def _result(self, future: Future[Result]) -> Result:
-        """Return what a worker handed back.
-
-        Raises:
-            ProcessExpired: If it died.
-            BrokenProcessPool: If all did.
-        """
+        """Return what a worker handed back."""
         try:
             return future.result()
         except (ProcessExpired, BrokenProcessPool):

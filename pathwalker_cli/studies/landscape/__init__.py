@@ -186,11 +186,6 @@ def _around(values: np.ndarray, value: float) -> tuple[int, ...]:
 def landscape_of(study: LandscapeStudy, run: Run, work: Work) -> Landscape:
     """Solve a landscape.
 
-    Args:
-        study: What was asked for.
-        run: The converged run to stand on.
-        work: Where; solved points are kept there and not solved again.
-
     Raises:
         ConfigError: If an axis is wrong, or the base ties the sides.
         NotConvergedError: If the user stopped it, or there is nothing to begin with.
@@ -203,21 +198,16 @@ def landscape_of(study: LandscapeStudy, run: Run, work: Work) -> Landscape:
     root = near.optimum
     if study.side == "both":
         root = solve(ROOT, graph.points[ROOT], near.optimum)
-        _require(root)
+        if not root.converged:
+            raise NotConvergedError(
+                "no solution was found with the springs of the optimum tied to equal values on "
+                f"both sides: {root.result.status}; a landscape of one side needs none"
+            )
     corners = [point_name(i, j) for i in (0, k_d.size - 1) for j in (0, k_p.size - 1)]
     leaps = {name: [("leap", near.optimum)] for name in corners}
     rules: Rules[Optimum] = Rules(motion_distance, motion_signature, sweeps=study.sweeps)
     explored = explore(graph, root, solve, rules, leaps if study.leaps else None)
     return _result(study, near, (k_d, k_p), graph, explored, corners)
-
-
-def _require(root: Optimum) -> None:
-    """Refuse to go on without a solution to begin with."""
-    if not root.converged:
-        raise NotConvergedError(
-            "no solution was found with the springs of the optimum tied to equal values on both "
-            f"sides: {root.result.status}; a landscape of one side needs none"
-        )
 
 
 def with_springs(case: Case, springs: Springs, values: Values) -> Case:

@@ -12,15 +12,14 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.evaluation.paper import PATIENT, paper_number
 from pathwalker_cli.patient.blocks import SpringSet
+from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.save import save_formats
-from pathwalker_cli.stride.figures.style import STYLE, legend, legend_panel, new_figure
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.landscape.result import Landscape
 
@@ -45,8 +44,8 @@ _FLAT: Final = 1e-3
 
 def landscape_figure(landscape: Landscape) -> Figure:
     """Return the figure of a landscape."""
-    with mpl.rc_context(STYLE):
-        fig = new_figure(5.9)
+    with mpl.rc_context(style.STYLE):
+        fig = style.new_figure(5.9)
         panels = fig.subplot_mosaic([["cost", "cost"], ["a", "b"], ["c", "legend"]],
                                     height_ratios=[2.1, 1.0, 1.0])  # fmt: skip
         _draw_cost(fig, panels["cost"], landscape)
@@ -56,7 +55,7 @@ def landscape_figure(landscape: Landscape) -> Figure:
             _draw_measure(fig, panels[name], landscape, key)
         for artist in (*panels["cost"].lines, *panels["cost"].collections):
             artist.set_in_layout(False)  # marks on the edge would push all axes away from it
-        legend_panel(panels["legend"], _handles(landscape))
+        style.legend_panel(panels["legend"], _handles(landscape))
     return fig
 
 
@@ -68,21 +67,21 @@ def cost_figure(landscape: Landscape, springs: SpringSet | None, chosen: Chosen)
         springs: Springs that exist, or None.
         chosen: K_D and K_P of the real springs to take by side [N m/rad]; empty if nothing chose.
     """
-    with mpl.rc_context(STYLE):
-        fig = new_figure(3.5)
+    with mpl.rc_context(style.STYLE):
+        fig = style.new_figure(3.5)
         ax = fig.subplots()
         _draw_cost(fig, ax, landscape)
         handles = _handles(landscape)
         if springs is not None:
             _mark_real(ax, springs)
-            handles.append(Line2D([], [], linestyle="none", label="real springs", **_REAL_D))
+            handles.append(style.entry("real springs", linestyle="none", **_REAL_D))
         for k_d, k_p in chosen.values():
             ax.plot(k_d, k_p, linestyle="none", clip_on=False, zorder=6, **_SQUARE)
         if chosen:
-            handles.append(Line2D([], [], linestyle="none", label="to take", **_SQUARE))
+            handles.append(style.entry("to take", linestyle="none", **_SQUARE))
         for artist in (*ax.lines, *ax.collections):
             artist.set_in_layout(False)
-        legend(fig, handles)
+        style.legend(fig, handles)
     return fig
 
 
@@ -220,10 +219,8 @@ def _handles(landscape: Landscape) -> list[Artist]:
         (_RING, "several local optima,\nbest shown", bool(landscape.branched)),
         (_CROSS, "no solution", bool(landscape.failed)),
     ]
-    handles: list[Artist] = [
-        Line2D([], [], linestyle="none", label=label, **marker)
-        for marker, label, there in entries
-        if there
+    handles = [
+        style.entry(label, linestyle="none", **marker) for marker, label, there in entries if there
     ]
     text = f"at most {100 * landscape.tolerance:g} % above\nthe least"
     return [Patch(facecolor="none", edgecolor="black", hatch="///", linewidth=1.5, label=text),

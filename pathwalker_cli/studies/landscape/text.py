@@ -154,15 +154,11 @@ def _region(landscape: Landscape) -> Iterator[tuple[str, str]]:
         degrees = f"{np.deg2rad(low):.2f} to {np.deg2rad(high):.2f} N m/deg"
         yield label, f"{name} {low:.1f} to {high:.1f} N m/rad ({degrees})"
         label = ""
-    share = 100.0 * region.share
-    yield "", f"{region.points} grid points, {share:.0f} % of those solved; {_ends(region)}"
+    share, ends = 100.0 * region.share, "all of it lies inside the range that was looked at"
+    if region.ends:
+        ends = f"it reaches the end of the range at {', '.join(region.ends)} and may go on beyond"
+    yield "", f"{region.points} grid points, {share:.0f} % of those solved; {ends}"
     yield "", "that region, not a point, is the recommendation"
-
-
-def _ends(region: Region) -> str:
-    if not region.ends:
-        return "all of it lies inside the range that was looked at"
-    return f"it reaches the end of the range at {', '.join(region.ends)} and may go on beyond"
 
 
 def _proof(landscape: Landscape) -> Iterator[tuple[str, str]]:

@@ -11,7 +11,6 @@ import numpy as np
 
 from pathwalker_cli.config.learnt import COST, Learnt
 from pathwalker_cli.conventions import SIDES, to_degrees
-from pathwalker_cli.evaluation.curves import ANGLES
 from pathwalker_cli.evaluation.differences import (
     force_rms,
     recorded_rms_mean_cycle,
@@ -23,6 +22,7 @@ from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.io.yaml_file import yaml_text
+from pathwalker_cli.stride.figures.curves import ANGLES
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.stride.stride import Stride
 from pathwalker_cli.studies.learn.targets import Target, cycles

@@ -14,8 +14,8 @@ from typing import Final, Literal
 import numpy as np
 
 from pathwalker_cli.conventions import SIDES, Side
-from pathwalker_cli.evaluation.curves import ANGLES, FORCES, MOMENTS, CycleCurve
 from pathwalker_cli.evaluation.recorded import RecordedGait
+from pathwalker_cli.stride.figures.curves import ANGLES, FORCES, MOMENTS, CycleCurve
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.stride.stride import Stride
 

@@ -111,11 +111,6 @@ def plan(study: PerturbationStudy, solver: GaitSolver) -> Plan:
 def perturb(study: PerturbationStudy, run: Run, work: Work) -> Perturbation:
     """Move every number of an optimum and solve all the rest again.
 
-    Args:
-        study: What to move.
-        run: The converged run whose numbers are moved.
-        work: Where; solved neighbours are kept there and not solved again.
-
     Raises:
         ConfigError: If a number to be moved is prescribed, or cannot be had so small or large.
         NotConvergedError: If the optimum cannot be solved to the tolerance.

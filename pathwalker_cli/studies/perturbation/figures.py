@@ -10,20 +10,10 @@ import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.save import save_formats
-from pathwalker_cli.stride.figures.style import (
-    LINE_COLOUR,
-    MARKER,
-    NEUTRAL,
-    STYLE,
-    dress,
-    legend,
-    new_figure,
-    side_look,
-)
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.perturbation.result import Perturbation, Perturbed
@@ -41,17 +31,17 @@ def save_perturbation_figure(result: Perturbation, folder: Path) -> None:
 
 def perturbation_figure(result: Perturbation) -> Figure:
     """Return one panel per measure with the change [%] for every spring that was moved."""
-    with mpl.rc_context(STYLE):
-        fig = new_figure(2.4 + 0.95 * len(result.rows))
+    with mpl.rc_context(style.STYLE):
+        fig = style.new_figure(2.4 + 0.95 * len(result.rows))
         panels = fig.subplots(3, 2, sharey=True)
         for ax, key in zip(panels.flat, COMPARED, strict=True):
             _draw(ax, result, key)
-            dress(ax, fill(measure_of(key).label, _TITLE), "change [%]")
+            style.dress(ax, fill(measure_of(key).label, _TITLE), "change [%]")
             ax.grid(visible=False, axis="y")
         ax = panels[0, 0]
         ax.set_yticks(range(len(result.rows)), [_label(result, row) for row in result.rows])
         ax.set_ylim(len(result.rows) - 0.5, -0.5)
-        legend(fig, _handles(result))
+        style.legend(fig, _handles(result))
         return fig
 
 
@@ -63,10 +53,10 @@ def _label(result: Perturbation, row: Perturbed) -> str:
 
 def _draw(ax: Axes, result: Perturbation, key: str) -> None:
     """Draw the changes of one measure, from zero to each mark."""
-    ax.axvline(0.0, color=NEUTRAL, linewidth=0.6)
+    ax.axvline(0.0, color=style.NEUTRAL, linewidth=0.6)
     shown = [0.0]
     for y, row in enumerate(result.rows):
-        colour, marker = side_look(row.name)
+        colour, marker = style.side_look(row.name)
         if key in row.changes:
             x = 100.0 * row.changes[key]
             ax.plot([0.0, x], [y, y], color=colour, linewidth=1.4, solid_capstyle="butt")
@@ -83,14 +73,14 @@ def _draw(ax: Axes, result: Perturbation, key: str) -> None:
 
 def _handles(result: Perturbation) -> list[Artist]:
     """Return the entries of the legend."""
-    handles: list[Artist] = [
-        Line2D([], [], color=LINE_COLOUR[side], marker=MARKER[side], markersize=4.5,
-               label=f"{side} {result.noun} moved")
+    handles = [
+        style.entry(f"{side} {result.noun} moved", color=style.LINE_COLOUR[side],
+                    marker=style.MARKER[side], markersize=4.5)
         for side in reversed(SIDES)
     ]  # fmt: skip
     if any(row.changes_article for row in result.rows):
         handles.append(
-            Line2D([], [], color="black", marker="D", markersize=4.5, mfc="none", linewidth=0,
-                   label="article, table 5\n(another optimum)")
+            style.entry("article, table 5\n(another optimum)", color="black", marker="D",
+                        markersize=4.5, mfc="none", linewidth=0)
         )  # fmt: skip
     return handles

@@ -148,13 +148,7 @@ def remark(
 
 
 def paper_changes(case: Case, name: str, factor: float) -> dict[str, float]:
-    """Return what the article prints for a moved spring, as shares; empty for any other.
-
-    Args:
-        case: Who walks, and how: the article is about one patient and one problem.
-        name: Name of the spring.
-        factor: Its stiffness over that of the optimum.
-    """
+    """Return what the article prints for a moved spring, as shares; empty for any other."""
     same = (case.unvaried.id, case.config.problem) == (PATIENT, _PAPER_PROBLEM)
     if not same or factor != _PAPER_FACTOR:
         return {}

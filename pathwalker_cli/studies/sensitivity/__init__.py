@@ -72,12 +72,7 @@ class SensitivityStudy(NeighbourStudy):
 
 
 def default_places(patient: Patient, with_orthosis: bool) -> tuple[str, ...]:
-    """Return the places in a patient's file that are asked about.
-
-    Args:
-        patient: The patient.
-        with_orthosis: Whether the orthosis is worn.
-    """
+    """Return the places in a patient's file that are asked about."""
     places = []
     if with_orthosis:
         places += [f"orthosis.{name}" for name in _ORTHOSIS]
@@ -132,11 +127,6 @@ def plan(asked: SensitivityStudy, solver: GaitSolver) -> Plan:
 
 def sensitivities(asked: SensitivityStudy, run: Run, work: Work) -> Sensitivities:
     """Return the sensitivities of an optimum.
-
-    Args:
-        asked: What is asked.
-        run: The converged run.
-        work: Where; re-solves of checks are kept there.
 
     Raises:
         ConfigError: If a place does not exist, or a check is asked for what is not.

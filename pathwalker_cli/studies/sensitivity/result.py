@@ -10,7 +10,6 @@ from typing import Any, Final
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measure_of, measures_in
 
 FILES: Final = ("sensitivity.csv", "sensitivity_check.csv", "sensitivity.json")
@@ -18,7 +17,7 @@ FILES: Final = ("sensitivity.csv", "sensitivity_check.csv", "sensitivity.json")
 _LABEL, _CELL = 41, 9
 """Widths of the columns on the terminal."""
 
-_SHOWN: Final = 1e-3
+SHOWN: Final = 1e-3
 """Elasticity [% per %] below which a cell shows a dot: it moves nothing that matters."""
 
 
@@ -108,7 +107,7 @@ def agreement(result: Sensitivities, check: Check) -> float:
     """
     own, worst = result.row(check.place).derivatives, 0.0
     for key, slope in check.derivatives.items():
-        least = _SHOWN * abs(result.base[key])
+        least = SHOWN * abs(result.base[key])
         worst = max(worst, abs(own[key] - slope) / max(abs(slope), least, 1e-300))
     return worst
 
@@ -161,11 +160,11 @@ def sensitivity_lines(result: Sensitivities) -> Iterator[str]:
     yield "Elasticities at the optimum, % per %"
     yield f"{'one percent more of':<{_LABEL}}" + "".join(f"{m.short:>{_CELL}}" for m in shown)
     for row in result.rows:
-        cells = "".join(f"{_cell(row, measure):>{_CELL}}" for measure in shown)
-        yield f"{label_of(row.place):<{_LABEL}}{cells}"
+        cells = (elasticity_text(row.elasticities.get(measure.key)) for measure in shown)
+        yield f"{label_of(row.place):<{_LABEL}}" + "".join(f"{cell:>{_CELL}}" for cell in cells)
     yield ""
     yield (
-        f"'.' is less than {_SHOWN:g}; a spring moves with the others following. "
+        f"'.' is less than {SHOWN:g}; a spring moves with the others following. "
         f"{result.active} inequalities are active, {result.doubtful} of all are in doubt: "
         "beyond a change of the active set the numbers no longer hold."
     )
@@ -179,8 +178,8 @@ def sensitivity_lines(result: Sensitivities) -> Iterator[str]:
         )
 
 
-def _cell(row: Sensitivity, measure: Measure) -> str:
-    elasticity = row.elasticities.get(measure.key)
+def elasticity_text(elasticity: float | None) -> str:
+    """Return an elasticity [% per %] as a cell shows it."""
     if elasticity is None:
         return "-"
-    return f"{elasticity:.3f}" if abs(elasticity) >= _SHOWN else "."
+    return f"{elasticity:.3f}" if abs(elasticity) >= SHOWN else "."

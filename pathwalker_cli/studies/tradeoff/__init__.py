@@ -11,7 +11,6 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field, field_validator
 
-from pathwalker_cli.case import Case
 from pathwalker_cli.config.schema import Weight
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
@@ -64,12 +63,7 @@ def plan(study: TradeoffStudy, solver: GaitSolver) -> Plan:
 
 
 def chain(weights: tuple[float, ...], base: float) -> Graph:
-    """Return the points of a trade-off: one behind the other by weight, the base among them.
-
-    Args:
-        weights: Weights of walking speed.
-        base: That of the base.
-    """
+    """Return the points of a trade-off: one behind the other by weight, the base among them."""
     named: dict[str, Values] = {ROOT: (base,), **{f"w{w:g}": (w,) for w in weights}}
     order = sorted(named, key=lambda name: named[name])
     return Graph(named, tuple(pairwise(order)), ROOT)
@@ -78,17 +72,12 @@ def chain(weights: tuple[float, ...], base: float) -> Graph:
 def tradeoff_of(study: TradeoffStudy, run: Run, work: Work) -> Tradeoff:
     """Solve a trade-off.
 
-    Args:
-        study: What was asked for.
-        run: The converged run to stand on.
-        work: Where: solved points in `points`, refined ones in `runs`.
-
     Raises:
         NotConvergedError: If the user stopped it.
     """
     near = Neighbours(run, work.folder / "points", study.max_iterations, work.report)
     base = run.config.cost.walking_speed_weight
-    solve = near.solver(lambda values: _with_weight(run.case, values))
+    solve = near.solver(lambda w: run.case.with_values({"cost.walking_speed_weight": w[0]}))
     rules: Rules[Optimum] = Rules(
         lambda one, other: 1.0, motion_signature, without_reward, jump=0.0, sweeps=study.sweeps
     )
@@ -103,11 +92,6 @@ def tradeoff_of(study: TradeoffStudy, run: Run, work: Work) -> Tradeoff:
             point = refined.point(point, branches[0].end)
         points.append(point)
     return _result(near, explored, judged(points), refined.seconds)
-
-
-def _with_weight(case: Case, values: Values) -> Case:
-    """Return a case with another weight of walking speed, the only one of the values."""
-    return case.with_values({"cost.walking_speed_weight": values[0]})
 
 
 def without_reward(optimum: Optimum) -> float:

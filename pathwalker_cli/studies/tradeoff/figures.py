@@ -10,20 +10,11 @@ import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pathwalker_cli.conventions import Side
+from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.save import save_formats
-from pathwalker_cli.stride.figures.style import (
-    LINE_COLOUR,
-    LINE_STYLE,
-    NEUTRAL,
-    STYLE,
-    dress,
-    legend,
-    new_figure,
-)
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 
@@ -35,16 +26,16 @@ _NEAR: Final = 0.01
 
 def tradeoff_figure(tradeoff: Tradeoff) -> Figure:
     """Return the figure of a trade-off with at least one solution."""
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(style.STYLE):
         rows = 2 if tradeoff.springs else 1
-        fig = new_figure(0.5 + 2.0 * rows)
+        fig = style.new_figure(0.5 + 2.0 * rows)
         panels = fig.subplots(rows, 1, squeeze=False)[:, 0]
         _draw_front(panels[0], tradeoff)
-        dress(panels[0], "What speed costs", _SPEED, "effort per distance [s/m]")
+        style.dress(panels[0], "What speed costs", _SPEED, "effort per distance [s/m]")
         if tradeoff.springs:
             _draw_springs(panels[1], tradeoff)
-            dress(panels[1], "Springs along the front", _SPEED, "stiffness [N m/rad]")
-        legend(fig, _handles(tradeoff))
+            style.dress(panels[1], "Springs along the front", _SPEED, "stiffness [N m/rad]")
+        style.legend(fig, _handles(tradeoff))
     return fig
 
 
@@ -70,11 +61,7 @@ def _draw_front(ax: Axes, tradeoff: Tradeoff) -> None:
 
 
 def labels(points: Sequence[FrontPoint]) -> list[tuple[FrontPoint, str]]:
-    """Return where to write which weights: points in one place share a label.
-
-    Args:
-        points: The points, by rising weight.
-    """
+    """Return where to write which weights, which rise: points in one place share a label."""
     groups: list[list[FrontPoint]] = []
     for point in points:
         last = groups[-1][0] if groups else None
@@ -102,8 +89,7 @@ def _spring(name: str) -> dict[str, Any]:
     """Return the look of a spring: colour and line by side, marker by kind."""
     side: Side = "right" if name.endswith("right") else "left"
     return {
-        "color": LINE_COLOUR[side],
-        "linestyle": LINE_STYLE[side],
+        **style.side_line(side),
         "marker": _MARKER[name.split("_")[0]],
         "markersize": 3.5 if side == "right" else 6.5,  # both are seen where they agree
         "fillstyle": "full" if side == "right" else "none",
@@ -113,7 +99,8 @@ def _spring(name: str) -> dict[str, Any]:
 
 _FRONT: Final[dict[str, Any]] = {"color": "black", "marker": "o", "markersize": 4.0}
 _BEATEN: Final[dict[str, Any]] = {
-    "linestyle": "none", "marker": "o", "markersize": 4.0, "color": NEUTRAL, "fillstyle": "none",
+    "linestyle": "none", "marker": "o", "markersize": 4.0, "color": style.NEUTRAL,
+    "fillstyle": "none",
 }  # fmt: skip
 _COARSE: Final[dict[str, Any]] = {
     "linestyle": "none", "marker": "x", "markersize": 7.0, "color": "#D55E00",
@@ -122,14 +109,12 @@ _COARSE: Final[dict[str, Any]] = {
 
 def _handles(tradeoff: Tradeoff) -> list[Artist]:
     """Return the legend entries of what is in the figure."""
-    handles: list[Artist] = [Line2D([], [], label="front, with weight of speed", **_FRONT)]
+    handles = [style.entry("front, with weight of speed", **_FRONT)]
     if len(tradeoff.front) < len(tradeoff.solved):
-        handles.append(Line2D([], [], label="dominated", **_BEATEN))
+        handles.append(style.entry("dominated", **_BEATEN))
     if tradeoff.coarse:
-        handles.append(Line2D([], [], label="mesh too coarse", **_COARSE))
+        handles.append(style.entry("mesh too coarse", **_COARSE))
     if tradeoff.recorded_walking_speed is not None:
         handles.append(Patch(facecolor="#bbbbbb", alpha=0.5, label="recorded speeds"))
-    return [
-        *handles,
-        *(Line2D([], [], **_spring(n), label=measure_of(n).label) for n in tradeoff.springs),
-    ]
+    springs = (style.entry(measure_of(n).label, **_spring(n)) for n in tradeoff.springs)
+    return [*handles, *springs]

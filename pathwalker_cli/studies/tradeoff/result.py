@@ -174,15 +174,6 @@ def tradeoff_content(tradeoff: Tradeoff) -> dict[str, Any]:
     return plain if tradeoff.further else {k: v for k, v in plain.items() if k != "further"}
 
 
-def tradeoff_of_content(content: Mapping[str, Any]) -> Tradeoff:
-    """Return a trade-off as its summary tells it.
-
-    Raises:
-        ValueError: If it is not what `tradeoff_content` returns.
-    """
-    return _PLAIN.validate_python(content)
-
-
 def write_tables(tradeoff: Tradeoff, folder: Path) -> None:
     """Write every point as a row, and the summary."""
     measures = measures_with(tradeoff.further)

@@ -80,10 +80,6 @@ class UncertaintyStudy(NeighbourStudy):
 def draw_cases(case: Case, draws: Draws) -> list[Case]:
     """Return the case of every draw; all are checked before any is solved.
 
-    Args:
-        case: The base; what it varies already is varied still.
-        draws: What was drawn.
-
     Raises:
         PatientError: If a patient that was drawn is refused.
     """
@@ -121,11 +117,6 @@ def plan(study: UncertaintyStudy, solver: GaitSolver) -> Plan:
 
 def uncertainty(study: UncertaintyStudy, run: Run, work: Work) -> Uncertainty:
     """Solve all draws from the optimum of a run.
-
-    Args:
-        study: What to draw.
-        run: The converged run to start from.
-        work: Where; solved draws are kept there and not solved again.
 
     Raises:
         ConfigError: If a place is wrong.

@@ -155,10 +155,6 @@ def inputs_of(quantities: Mapping[str, Distribution], patient: Patient) -> tuple
 
     A pair of numbers, such as a range, stays together.
 
-    Args:
-        quantities: Distribution by place.
-        patient: The patient as in the file.
-
     Raises:
         ConfigError: If a place does not exist, holds no number, or would be drawn twice.
     """

@@ -12,21 +12,11 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pathwalker_cli.conventions import SIDES, STIFFNESSES
+from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.save import save_formats
-from pathwalker_cli.stride.figures.style import (
-    LINE_COLOUR,
-    MARKER,
-    NEUTRAL,
-    STYLE,
-    dress,
-    legend,
-    new_figure,
-    side_look,
-)
 from pathwalker_cli.studies.measures import Ranges
 from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
 
@@ -64,9 +54,9 @@ def spread_figure(
     """
     springs = [spread for spread in spreads_of if spread.measure.key in STIFFNESSES]
     others = [spread for spread in spreads_of if spread not in springs and spread.base]
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(style.STYLE):
         rows = (len(springs) + 1, len(others))
-        fig = new_figure(1.6 + 0.27 * sum(rows))
+        fig = style.new_figure(1.6 + 0.27 * sum(rows))
         left, right = fig.subplots(2, 1, height_ratios=rows)
         for y, spread in enumerate(springs):
             low, high = ranges[spread.measure.key]
@@ -74,37 +64,29 @@ def spread_figure(
             _draw(left, y, values[spread.measure.key], spread, 1.0)
             left.text(high, y - 0.3, _limits(spread), ha="right", va="bottom")
         _rows(left, [spread.measure.label for spread in springs], -0.95)
-        dress(left, "Identified springs", "stiffness [N m/rad], logarithmic")
+        style.dress(left, "Identified springs", "stiffness [N m/rad], logarithmic")
         _stiffness_axis(left)
         for y, spread in enumerate(others):
             shares = 100.0 * (values[spread.measure.key] / spread.base - 1.0)
             _draw(right, y, shares, spread, 100.0)
         _rows(right, [fill(spread.measure.label, _LABEL) for spread in others], -0.6)
-        right.axvline(0.0, color=NEUTRAL, linewidth=0.6)
-        dress(right, "Cost and gait", "deviation from the base [%]")
+        right.axvline(0.0, color=style.NEUTRAL, linewidth=0.6)
+        style.dress(right, "Cost and gait", "deviation from the base [%]")
         for ax in (left, right):
             ax.grid(visible=False, axis="y")
-        legend(fig, _handles(len(values[spreads_of[0].measure.key])))
+        style.legend(fig, _handles(len(values[spreads_of[0].measure.key])))
         return fig
 
 
 def _draw(ax: Axes, y: int, values: np.ndarray, spread: Spread, unit: float) -> None:
-    """Draw the draws of one measure, their median and range, and the base.
-
-    Args:
-        ax: Where.
-        y: Its row.
-        values: What is drawn, in the unit of the axis.
-        spread: The measure.
-        unit: 100 for deviations in %, where the base is zero; 1 for the values themselves.
-    """
-    colour, marker = side_look(spread.measure.key)
+    """Draw the draws of one measure, their median and range, and the base."""
+    colour, marker = style.side_look(spread.measure.key)
     heights = y + np.random.default_rng(_SEED).uniform(-_STRIP, _STRIP, len(values))
     ax.plot(values, heights, marker, color=colour, markersize=2.6, alpha=0.45, mew=0.0)
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95))
     ax.plot([low, high], [y, y], color=colour, linewidth=1.6)
     ax.plot(middle, y, marker, color=colour, markersize=5.5, mec="white", mew=0.6)
-    base = spread.base if unit == 1.0 else 0.0
+    base = spread.base if unit == 1.0 else 0.0  # 100: deviations in %, around the base
     ax.plot(base, y, "|", color="black", markersize=13.0, mew=1.0)
 
 
@@ -131,16 +113,16 @@ def _rows(ax: Axes, labels: list[str], top: float) -> None:
 
 def _handles(count: int) -> list[Artist]:
     """Return the entries of the legend."""
-    point: dict[str, Any] = {"color": NEUTRAL, "linewidth": 0}
-    sides: list[Artist] = [
-        Line2D([], [], color=LINE_COLOUR[s], marker=MARKER[s], linewidth=0, markersize=4.5, label=s)
+    sides = [
+        style.entry(s, color=style.LINE_COLOUR[s], marker=style.MARKER[s], linewidth=0,
+                    markersize=4.5)
         for s in reversed(SIDES)
-    ]
+    ]  # fmt: skip
     return [
         *sides,
-        Line2D([], [], marker="^", markersize=2.6, alpha=0.45, label=f"{count} draws", **point),
-        Line2D([], [], color=NEUTRAL, marker="^", markersize=5.5, label="median, 90 % of draws"),
-        Line2D([], [], color="black", marker="|", markersize=9.0, linewidth=0, label="base"),
+        style.entry(f"{count} draws", marker="^", markersize=2.6, alpha=0.45, linewidth=0),
+        style.entry("median, 90 % of draws", marker="^", markersize=5.5),
+        style.entry("base", color="black", marker="|", markersize=9.0, linewidth=0),
         Patch(facecolor="#cccccc", label="range of real springs"),
     ]
 
@@ -150,8 +132,8 @@ def correlation_figure(result: Uncertainty, all_spreads: list[Spread]) -> Figure
     inputs = [entry.place for entry in result.draws.inputs]
     table = np.array([spread.correlations for spread in all_spreads]).T
     level = chance_level(len(result.converged), len(inputs))
-    with mpl.rc_context(STYLE):
-        fig = new_figure(1.5 + 0.13 * len(inputs))
+    with mpl.rc_context(style.STYLE):
+        fig = style.new_figure(1.5 + 0.13 * len(inputs))
         ax = fig.subplots()
         # blue and orange with white between: signs differ for any colour vision
         image = ax.imshow(table, cmap="PuOr_r", vmin=-1.0, vmax=1.0, aspect="auto")
@@ -160,7 +142,7 @@ def correlation_figure(result: Uncertainty, all_spreads: list[Spread]) -> Figure
                 colour = "white" if abs(value) > 0.6 else "black"
                 ax.text(x, y, _digit(value), color=colour, **_CELL)
             elif not np.isfinite(value):
-                ax.text(x, y, "-", color=NEUTRAL, **_CELL)
+                ax.text(x, y, "-", color=style.NEUTRAL, **_CELL)
         ax.set_yticks(range(len(inputs)), [_input(place) for place in inputs])
         ax.set_xticks(range(len(all_spreads)), [s.measure.short for s in all_spreads], rotation=90)
         ax.tick_params(length=0.0)

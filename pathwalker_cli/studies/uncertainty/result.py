@@ -164,12 +164,7 @@ def rank_correlations(inputs: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def chance_level(draws: int, inputs: int) -> float:
-    """Return the correlation that the strongest of so many idle inputs exceeds in 5 % of studies.
-
-    Args:
-        draws: Number of converged draws.
-        inputs: Number of inputs.
-    """
+    """Return what the strongest correlation of so many idle inputs exceeds in 5 % of studies."""
     if draws < 3:
         return 1.0
     return float(min(1.0, stats.norm.ppf(1.0 - _CHANCE / (2.0 * inputs)) / np.sqrt(draws - 1.0)))

@@ -1,0 +1,150 @@
+"""Figures of angles, moments, ground forces and activations over the gait cycle of each side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side
+from pathwalker_cli.stride.figures import style
+from pathwalker_cli.stride.figures.curves import (
+    ANGLES,
+    FORCES,
+    MOMENTS,
+    Band,
+    CycleCurve,
+    Reference,
+)
+from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.stride import own_cycle, stride_of
+
+_ANGLES: Final = {"pelvis_tilt_*": "Pelvis", "hip_*": "Hip", "knee_*": "Knee", "ankle_*": "Ankle",
+                  "lumbar_*": "Trunk against pelvis"}  # fmt: skip
+_MOMENTS: Final = {"hip_*": "Hip, extension +", "knee_*": "Knee, extension +",
+                   "ankle_*": "Ankle, plantarflexion +"}  # fmt: skip
+_FORCES: Final = {"foot_*_z": "Vertical, up +", "foot_*_x": "Fore-aft, forward +"}
+"""Names of bands, with a star for the side, and titles of the panels."""
+
+
+def joint_angles(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return pelvis, hip, knee, ankle and lumbar angles over the gait cycle of each side.
+
+    Flexion, dorsiflexion and forward lean are positive, as gait laboratories plot them.
+    """
+    bands, fig = reference.angles if reference else {}, style.new_figure(3.9)
+    panels = fig.subplots(3, 2).ravel()
+    handles = _draw(panels, series, ANGLES, _ANGLES, bands, lambda curve: curve.label)
+    style.legend_panel(panels[-1], handles)
+    return fig
+
+
+def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return net moments at hip, knee and ankle over the gait cycle of each side.
+
+    Internal moments, of muscles, tissue and orthosis on the joint, over mass with the orthosis;
+    extension and plantarflexion are positive.  Thin lines at the ankle are the part of the
+    orthosis, dotted ones that of passive tissue.
+    """
+    bands, fig = reference.moments if reference else {}, style.new_figure(2.9)
+    panels = fig.subplots(2, 2).ravel()
+    handles = _draw(panels, series, MOMENTS, _MOMENTS, bands, lambda curve: "net moment [N m/kg]")
+    if series.walker.orthosis:
+        torques = MOMENTS[-1].factor(series.walker) * series.orthosis_torque
+        for side, torque in zip(SIDES, torques.T, strict=True):
+            _draw_side(panels[2], series, side, torque, linewidth=0.7)
+        handles.append(style.entry("thin: orthosis alone", linewidth=0.7))
+    dotted = {"linewidth": 0.9, "linestyle": ":"}
+    for ax, curve, joint in zip(panels, MOMENTS, LEG_JOINTS, strict=False):
+        for side in SIDES:
+            if (torque := series.passive_torque.get(f"{joint}_{SUFFIX[side]}")) is not None:
+                _draw_side(ax, series, side, curve.factor(series.walker) * torque, **dotted)
+    if series.passive_torque:
+        handles.append(style.entry("dotted: tissue alone", **dotted))
+    style.legend_panel(panels[-1], handles)
+    return fig
+
+
+def ground_forces(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return vertical and fore-aft ground reaction forces on each foot over its gait cycle."""
+    bands, fig = reference.forces if reference else {}, style.new_figure(2.1)
+    panels = fig.subplots(1, 2)
+    handles = _draw(
+        panels, series, FORCES, _FORCES, bands, lambda curve: f"{curve.name} [% body weight]"
+    )
+    style.legend(fig, handles)
+    return fig
+
+
+def _draw(
+    panels: Sequence[Axes], series: GaitSeries, curves: Sequence[CycleCurve],
+    titles: Mapping[str, str], bands: Mapping[str, Band], label: Callable[[CycleCurve], str],
+) -> list[Artist]:  # fmt: skip
+    """Draw a quantity per panel over both sides' own cycles; return the entries of the legend."""
+    stride = stride_of(series)
+    for ax, curve, (name, title) in zip(panels, curves, titles.items(), strict=False):
+        for side in SIDES:
+            if (band := bands.get(name.replace("*", SUFFIX[side]))) is not None:
+                _draw_band(ax, band, side, float(curve.factor(series.walker)))
+        style.dress(ax, title, y=label(curve))
+        style.zero_line(ax)
+        for side in SIDES:
+            _draw_side(ax, series, side, curve.columns(stride, side)[:, 0])
+            style.toe_off_line(ax, own_cycle(series, side))
+        style.percent_axis(ax)
+    recorded = [style.band_handle()] if bands else []
+    return [*style.side_handles(), style.events_handle(), *recorded]
+
+
+def _draw_side(ax: Axes, series: GaitSeries, side: Side, values: np.ndarray, **more: Any) -> None:
+    cycle, look = own_cycle(series, side), style.side_line(side)
+    ax.plot(cycle.percent, values[cycle.index], **(look | more))
+
+
+def _draw_band(ax: Axes, band: Band, side: Side, factor: float) -> None:
+    """Draw a recorded range and its mean in the unit of the panel."""
+    look = {**style.side_line(side), "alpha": 0.6}
+    low, high = sorted((factor * band.low, factor * band.high), key=lambda each: each.mean())
+    ax.fill_between(band.percent, low, high, color=look["color"], alpha=0.15, linewidth=0)
+    for edge in (low, high):  # so that the ranges of both sides differ without colour too
+        ax.plot(band.percent, edge, linewidth=0.4, **look)
+    ax.plot(band.percent, factor * band.mean, linewidth=0.7, **look)
+
+
+def activations(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return activation and excitation of every generator over the gait cycle of its side."""
+    fig = style.new_figure(4.6)
+    grid = fig.subplots(4, 4, sharex=True, sharey=True)
+    columns = tuple(product(SIDES, ("extension", "flexion")))
+    for row, joint in zip(grid, LEG_JOINTS, strict=False):
+        for ax, (side, direction) in zip(row, columns, strict=True):
+            name = f"{joint}_{direction}_{SUFFIX[side]}"
+            _draw_generator(ax, series, name, side, f"{side.capitalize()} {joint}\n{direction}")
+    _draw_generator(grid[-1][0], series, "lumbar_extension", "right", "Trunk\nforward")
+    _draw_generator(grid[-1][1], series, "lumbar_flexion", "right", "Trunk\nbackward")
+    for row in grid:
+        row[0].set_ylabel("activation [1]", labelpad=2.0)
+    for top, ax in zip(grid[-2][2:], grid[-1][2:], strict=True):  # two panels have no generator
+        ax.axis("off")
+        style.percent_axis(top, "own cycle\n[%]")
+        top.xaxis.set_tick_params(labelbottom=True)
+    for ax in grid[-1][:2]:
+        style.percent_axis(ax, "right cycle\n[%]")
+    grid[0][0].set_ylim(-0.03, 1.05)
+    grid[0][0].set_yticks([0.0, 0.5, 1.0])
+    thin = style.entry("thin: excitation", linewidth=0.6)
+    style.legend(fig, [*style.side_handles(), thin, style.events_handle()])
+    return fig
+
+
+def _draw_generator(ax: Axes, series: GaitSeries, name: str, side: Side, title: str) -> None:
+    column, thin = GENERATORS.index(name), {"linewidth": 0.6, "linestyle": "-"}
+    style.dress(ax, title)
+    _draw_side(ax, series, side, series.excitation[:, column], **thin)
+    _draw_side(ax, series, side, series.activation[:, column])
+    style.toe_off_line(ax, own_cycle(series, side))
