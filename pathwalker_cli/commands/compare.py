@@ -13,7 +13,6 @@ from pathwalker_cli.commands.options import json_option, out_option, print_json,
 if TYPE_CHECKING:
     from pathwalker_cli.evaluation.evaluate import Change, Evaluation
     from pathwalker_cli.report.compare import Comparison
-    from pathwalker_cli.stride.stride import Stride
 
 
 @click.command("compare")
@@ -75,14 +74,13 @@ def evaluate_command(
     A barefoot run and one with orthoses of the same patient also give the change from one to the
     other. Recordings are those beside the patient's file. A run that did not converge is refused.
     """
-    from pathwalker_cli.evaluation.evaluate import evaluate_gait
+    from pathwalker_cli.evaluation.evaluate import changes_between, evaluate_gaits
     from pathwalker_cli.evaluation.run import gaits_of_runs
     from pathwalker_cli.evaluation.tables import evaluation_content
 
     gaits = [gait for _, gait in gaits_of_runs(runs)]
-    trials = _trials(gaits, trial)
-    evaluations = [evaluate_gait(gait, name) for gait, name in zip(gaits, trials, strict=True)]
-    changes = _changes(evaluations)
+    evaluations = evaluate_gaits(gaits, trial)
+    changes = changes_between(evaluations)
     content = evaluation_content(evaluations, changes)
     out = out or Path("runs") / "-".join(["evaluation", *(gait.name for gait in gaits)])
     _write_evaluation(out, evaluations, content)
@@ -90,36 +88,6 @@ def evaluate_command(
         print_json(content)
     else:
         _report(evaluations, changes, out)
-
-
-def _trials(gaits: Sequence[Stride], trial: str | None) -> list[str | None]:
-    """Return the trial for each gait: the wanted one where its condition has it."""
-    from pathwalker_cli.errors import DataError
-    from pathwalker_cli.io.recordings import recording_names
-
-    if trial is None:
-        return [None] * len(gaits)
-    names = [recording_names(gait.walker.patient, gait.walker.condition) for gait in gaits]
-    if not any(trial in own for own in names):
-        allowed = ", ".join(dict.fromkeys(name for own in names for name in own))
-        raise DataError(
-            f"there is no recording '{trial}'",
-            where="--trial",
-            allowed=allowed or "none are there",
-            mend="leave it out",
-        )
-    return [trial if trial in own else None for own in names]
-
-
-def _changes(evaluations: Sequence[Evaluation]) -> tuple[Change, ...]:
-    """Return the changes between a barefoot run and one with orthoses of the same patient."""
-    from pathwalker_cli.evaluation.evaluate import gait_changes
-
-    pair = sorted(evaluations, key=lambda each: each.gait.walker.condition)
-    walkers = [each.gait.walker for each in pair]
-    if [walker.condition for walker in walkers] != ["barefoot", "orthosis"]:
-        return ()
-    return gait_changes(*pair) if walkers[0].patient.id == walkers[1].patient.id else ()
 
 
 def _write_evaluation(

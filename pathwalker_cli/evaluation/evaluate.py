@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.errors import DataError
 from pathwalker_cli.evaluation.differences import (
     DIFFERENCES,
     force_rms,
@@ -31,6 +32,7 @@ from pathwalker_cli.evaluation.recorded import (
     recorded_numbers,
     reference_stride,
 )
+from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.stride.measure import SECTIONS, Measure
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.stride.stride import Stride
@@ -164,6 +166,24 @@ def evaluate_gait(
     )
 
 
+def evaluate_gaits(gaits: Sequence[Stride], trial: str | None = None) -> list[Evaluation]:
+    """Return gaits beside the recordings of each, with a trial where its condition has it.
+
+    Raises:
+        DataError: If a recording cannot be used, or no condition has the trial.
+    """
+    names = [recording_names(gait.walker.patient, gait.walker.condition) for gait in gaits]
+    if trial is not None and not any(trial in own for own in names):
+        raise DataError(
+            f"there is no recording '{trial}'",
+            where="--trial",
+            allowed=", ".join(dict.fromkeys(sum(names, ()))) or "none are there",
+            mend="leave it out",
+        )
+    trials = (trial if trial in own else None for own in names)
+    return [evaluate_gait(gait, name) for gait, name in zip(gaits, trials, strict=True)]
+
+
 def compared() -> tuple[Measure, ...]:
     """Return all measures in which a gait is compared, in the order in which they are shown."""
     found = (*measures_in("evaluate"), *DIFFERENCES)
@@ -187,6 +207,18 @@ def gait_changes(barefoot: Evaluation, orthosis: Evaluation) -> tuple[Change, ..
             Change(measure, first.value, second.value, recorded, paper if article else None)
         )
     return tuple(changes)
+
+
+def changes_between(evaluations: Sequence[Evaluation]) -> tuple[Change, ...]:
+    """Return the changes from a barefoot gait to one with orthoses of the same patient.
+
+    There are none between any others, or if there are more than the two.
+    """
+    pair = sorted(evaluations, key=lambda each: each.gait.walker.condition)
+    walkers = [each.gait.walker for each in pair]
+    two = [walker.condition for walker in walkers] == ["barefoot", "orthosis"]
+    same = len({walker.patient.id for walker in walkers}) == 1
+    return gait_changes(*pair) if two and same else ()
 
 
 Found = tuple[dict[str, float], dict[str, Spread], tuple[str, ...]]

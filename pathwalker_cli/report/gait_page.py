@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
-from pathwalker_cli.evaluation.evaluate import Change
+from pathwalker_cli.evaluation.evaluate import Change, changes_between
 from pathwalker_cli.evaluation.tables import spread_text
 from pathwalker_cli.report.assumptions import assumption_section
 from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
 from pathwalker_cli.report.figures import curve_section
 from pathwalker_cli.report.folders import Study
-from pathwalker_cli.report.runs import ReportRun, changes_of
+from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.springs import prescribed, recommended, spring_section
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.stride.measure import KNEE, Measure
@@ -21,7 +21,7 @@ from pathwalker_cli.studies.verdict import snapped_warning
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
     """Return the page about runs of one patient, barefoot ones first, with studies around them."""
-    patient, changes = runs[0].patient, changes_of(runs)
+    patient, changes = runs[0].patient, changes_between([r.evaluation for r in runs])
     with_orthoses = [run for run in runs if run.worn]
     sections = [spring_section(run) for run in with_orthoses]
     sections += [gait_section(runs, changes), curve_section(runs)]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pathwalker_cli.errors import DataError, InputError
-from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
+from pathwalker_cli.evaluation.evaluate import Evaluation, evaluate_gait
 from pathwalker_cli.evaluation.run import run_and_gait
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.results.run_folder import Run
@@ -109,10 +109,3 @@ def _labels(folders: Sequence[Path]) -> list[str]:
         name if names.count(name) == 1 else f"{folder.resolve().parent.name}/{name}"
         for name, folder in zip(names, folders, strict=True)
     ]
-
-
-def changes_of(runs: Sequence[ReportRun]) -> tuple[Change, ...]:
-    """Return the changes from the one barefoot run to the one with orthoses, if there are both."""
-    if [run.worn for run in runs] != [False, True]:
-        return ()
-    return gait_changes(runs[0].evaluation, runs[1].evaluation)

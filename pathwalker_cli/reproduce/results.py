@@ -11,7 +11,7 @@ from typing import Any, Final
 from pathwalker_cli import __version__
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import CONDITIONS, Condition
-from pathwalker_cli.evaluation.evaluate import Change, Evaluation, evaluate_gait, gait_changes
+from pathwalker_cli.evaluation.evaluate import Change, Evaluation, changes_between, evaluate_gait
 from pathwalker_cli.evaluation.paper import PATIENT
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
 from pathwalker_cli.inverse.residuals import COMPONENTS, residual_tables
@@ -164,10 +164,8 @@ class Results:
     @property
     def changes(self) -> tuple[Change, ...]:
         """Changes from mapd-barefoot to mapd-orthosis; none unless both converged."""
-        pair = [self.problems[name].evaluation for name in ("mapd-barefoot", "mapd-orthosis")]
-        if pair[0] is None or pair[1] is None:
-            return ()
-        return gait_changes(pair[0], pair[1])
+        pair = (self.problems[name].evaluation for name in ("mapd-barefoot", "mapd-orthosis"))
+        return changes_between([each for each in pair if each is not None])
 
     @property
     def failed(self) -> tuple[str, ...]:
