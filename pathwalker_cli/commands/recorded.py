@@ -44,7 +44,9 @@ _SET = set_option("Override a config value.")
 )
 @click.option("--condition", required=True, type=click.Choice(CONDITIONS), help="What was worn.")
 @out_option("Output folder.", "-o", required=True, metavar=None)
-@click.option("--markers", help="Marker set; the shipped markers.yaml if left out.")
+@click.option("--markers", help="Marker set, a file; by the markers' names if left out.")
+@click.option("--subject", metavar="NAME", help="Whose markers, if a file names several.")
+@click.option("--mend-plates", is_flag=True, help="Mend plates that are stored wrongly.")
 @_QUIET
 def import_command(
     c3d: tuple[str, ...],
@@ -52,6 +54,8 @@ def import_command(
     condition: Condition,
     out: Path,
     markers: str | None,
+    subject: str | None,
+    mend_plates: bool,
     quiet: bool,
 ) -> None:
     """Turn C3D files, or folders of them, into angles, events and forces.
@@ -69,7 +73,14 @@ def import_command(
         return _Findings()
 
     files = Paths.model_validate({condition: c3d})
-    config = RecordedConfig(patient=patient, conditions=(condition,), c3d=files, markers=markers)
+    config = RecordedConfig(
+        patient=patient,
+        conditions=(condition,),
+        c3d=files,
+        markers=markers,
+        subject=subject,
+        mend_plates=mend_plates,
+    )
     _study(config, kinematics_trials, write, out, quiet)
 
 
@@ -191,7 +202,7 @@ def _study(
     """
     from rich.console import Console
 
-    from pathwalker_cli.inverse.text import stance_notes, trial_warnings, trials_renderable
+    from pathwalker_cli.inverse.text import trial_notes, trial_warnings, trials_renderable
     from pathwalker_cli.io.atomic import staged_folder
     from pathwalker_cli.patient import load_patient
 
@@ -207,7 +218,7 @@ def _study(
     quiet = quiet or findings.content is not None
     console = Console(quiet=quiet, width=None if Console().is_terminal else 120)
     console.print(trials_renderable(trials))
-    for note in stance_notes(trials):
+    for note in trial_notes(trials):
         console.print(f"note: {note}", soft_wrap=True, markup=False, highlight=False)
     for table in findings.tables:
         console.print(table)

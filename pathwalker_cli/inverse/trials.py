@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import Condition, Side
+from pathwalker_cli.conventions import SIDES, SUFFIX, Condition, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.cycles import GaitCycle, Stance, gait_cycles, stances
 from pathwalker_cli.inverse.dynamics import (
@@ -19,21 +19,29 @@ from pathwalker_cli.inverse.dynamics import (
     inverse_dynamics,
     smooth_rates,
 )
-from pathwalker_cli.inverse.forces import ground_forces
-from pathwalker_cli.inverse.kinematics import MarkerResiduals, inverse_kinematics, pelvis_markers
+from pathwalker_cli.inverse.forces import foot_extents, ground_forces, plate_loads
+from pathwalker_cli.inverse.found_events import events_of_motion, set_by_plates
+from pathwalker_cli.inverse.kinematics import MarkerResiduals, inverse_kinematics
+from pathwalker_cli.inverse.marker_sets import KnownSet, recognised, set_points
 from pathwalker_cli.inverse.markers import (
     Gap,
+    MarkerPoint,
     bridge_gaps,
-    is_projected,
     load_marker_set,
     marker_points,
-    walking_plane,
 )
 from pathwalker_cli.inverse.published import AVERAGED_TRIALS, flagged_cycles, published_torques
-from pathwalker_cli.inverse.stance_checks import StanceForce
+from pathwalker_cli.inverse.stance_checks import LOADED, StanceForce
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, RecordedConfig
+from pathwalker_cli.inverse.walk import StandingError, is_projected, walks
 from pathwalker_cli.io.c3d import Recording
-from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording, require_plates
+from pathwalker_cli.io.c3d_checks import (
+    c3d_files,
+    check_markers,
+    readable_recording,
+    require_plates,
+)
+from pathwalker_cli.io.c3d_events import Event
 from pathwalker_cli.io.recordings import (
     CompactRecording,
     foot_columns,
@@ -63,6 +71,9 @@ class Trial(CompactRecording):
         markers: Distances of the markers from the walker, None without C3D.
         gaps: Gaps in the marker paths.
         published: Whether forces, torques and cycles are those of the article's own method.
+        first_frame: Number that the recording program gives the first frame.
+        remarks: How the file was read, a sentence each.
+        doubts: What in the file may be wrong, a sentence each.
     """
 
     condition: Condition
@@ -72,6 +83,9 @@ class Trial(CompactRecording):
     markers: MarkerResiduals | None = None
     gaps: tuple[Gap, ...] = ()
     published: bool = False
+    first_frame: int = 0
+    remarks: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def measured(self, cycle: GaitCycle) -> bool:
         """Return whether the force of the stance that begins a cycle is known."""
@@ -89,12 +103,40 @@ def kinematics_trials(
     Raises:
         DataError: If a recording cannot be used.
     """
-    trials = []
+    trials: list[Trial] = []
     for condition in config.recorded_conditions:
-        for path in c3d_files(config.c3d.of(condition)):
-            progress(f"{condition} {path.stem}")
-            trials.append(c3d_trial(path, patient, condition, config)[0])
+        trials += [trial for trial, _ in _walks(config, patient, condition, progress)]
     return tuple(trials)
+
+
+def _walks(
+    config: RecordedConfig,
+    patient: Patient,
+    condition: Condition,
+    progress: Progress,
+    wanted: Callable[[str], bool] = lambda _: True,
+) -> list[tuple[Trial, Recording]]:
+    """Return the trials of one condition; files in which nobody walks are set aside.
+
+    Raises:
+        DataError: If a recording cannot be used, or nobody walks in any.
+    """
+    found: list[tuple[Trial, Recording]] = []
+    still: list[StandingError] = []
+    for path in c3d_files(config.c3d.of(condition)):
+        if wanted(path.stem):
+            progress(f"{condition} {path.stem}")
+            try:
+                found += c3d_trials(path, patient, condition, config)
+            except StandingError as error:
+                still.append(error)
+    if still and not found:
+        raise still[0]
+    if still:
+        aside = tuple(f"{error.where} is set aside: its {error.what}" for error in still)
+        first, recording = found[0]
+        found[0] = replace(first, remarks=(*first.remarks, *aside)), recording
+    return found
 
 
 def dynamics_trials(
@@ -118,20 +160,20 @@ def _c3d_dynamics(
     config: InverseDynamicsConfig, patient: Patient, condition: Condition, progress: Progress
 ) -> list[Trial]:
     """Return the trials of one condition from C3D files."""
-    trials = []
-    files = c3d_files(config.c3d.of(condition))
     published = config.method == "published"
-    for path in files:
-        wanted = not config.trials or path.stem in config.trials
-        if not wanted or (published and path.stem not in AVERAGED_TRIALS[condition]):
-            continue
-        progress(f"{condition} {path.stem}")
-        trial, recording = c3d_trial(path, patient, condition, config)
-        require_plates(recording, path)
+
+    def wanted(name: str) -> bool:
+        ours = not published or name in AVERAGED_TRIALS[condition]
+        return ours and (not config.trials or name in config.trials)
+
+    trials = []
+    for trial, recording in _walks(config, patient, condition, progress, wanted):
+        require_plates(recording)
         if published:
             trials.append(_published(trial, recording, patient))
         else:
             trials.append(with_torques(trial, patient, config.motion_cutoff))
+    files = c3d_files(config.c3d.of(condition))
     if files and not trials and published:
         raise DataError(
             f"none of the {len(files)} {condition} files is a trial of the published tables",
@@ -141,38 +183,101 @@ def _c3d_dynamics(
     return trials
 
 
-def c3d_trial(
+def c3d_trials(
     path: Path, patient: Patient, condition: Condition, config: RecordedConfig
-) -> tuple[Trial, Recording]:
+) -> list[tuple[Trial, Recording]]:
     """Evaluate one C3D file: angles, events and, with force plates, forces, but no torques.
 
     Returns:
-        The trial, and the recording with short gaps bridged.
+        A trial for every pass, each with the recording as the file holds it.
+
+    Raises:
+        StandingError: If nobody walks.
+        DataError: If the recording cannot be used.
+    """
+    raw, known, points = read_markers(path, patient, condition, config)
+    trials = []
+    for walk in walks(raw, points):
+        placed = set_points(known, patient, walk) if known else points
+        trials.append((_walk_trial(walk, placed, patient, condition, config), raw))
+    return trials
+
+
+def read_markers(
+    path: Path, patient: Patient, condition: Condition, config: RecordedConfig
+) -> tuple[Recording, KnownSet | None, tuple[MarkerPoint, ...]]:
+    """Read a file and find out where its markers sit.
+
+    Returns:
+        The recording in the laboratory's axes; the set that its names are of, None for a given or
+        the shipped one; and its points.
 
     Raises:
         DataError: If the recording cannot be used.
     """
-    points = marker_points(load_marker_set(config.markers), patient, condition)
+    raw = readable_recording(path, config.subject)
+    known = None if config.markers else recognised(raw, str(path))
+    if known:
+        points = set_points(known, patient)
+        raw = replace(raw, remarks=(*raw.remarks, f"its markers are those of {known.name}"))
+    else:
+        points = marker_points(load_marker_set(config.markers), patient, condition)
+    check_markers(raw, [point.marker for point in points], patient.height, path)
+    return raw, known, points
+
+
+def _walk_trial(
+    walk: Recording,
+    points: tuple[MarkerPoint, ...],
+    patient: Patient,
+    condition: Condition,
+    config: RecordedConfig,
+) -> Trial:
+    """Return the trial of one pass in the walking plane."""
     names = tuple(point.marker for point in points)
-    recording = checked_recording(path, names, patient.height)
-    recording, gaps = bridge_gaps(recording, names, config.longest_gap)
+    walk, gaps = bridge_gaps(walk, names, config.longest_gap)
     model: pin.Model = pinocchio_model(patient, condition)
-    plane = walking_plane(recording, pelvis_markers(points))
-    motion, distances = inverse_kinematics(model, recording, points, plane)
-    in_lab = None if is_projected(recording, plane, names) else plane
-    forces = ground_forces(recording, model, motion, in_lab) if recording.plates else None
-    trial = Trial(
-        recording.name,
+    motion, distances = inverse_kinematics(model, walk, points)
+    if not any(event.kind == "foot_strike" for event in walk.events):
+        walk = _with_events(walk, model, motion)
+    aside = None if is_projected(walk, points) else _aside(walk, points)
+    forces = (
+        ground_forces(walk, model, motion, aside, mend=config.mend_plates) if walk.plates else None
+    )
+    return Trial(
+        walk.name,
         motion,
-        recording.events,
+        walk.events,
         forces.table if forces else None,
         condition,
-        gait_cycles(recording.events),
+        gait_cycles(walk.events),
         stances=forces.stances if forces else (),
         markers=distances,
         gaps=gaps,
+        first_frame=walk.first_frame,
+        remarks=walk.remarks,
+        doubts=forces.remarks if forces else (),
     )
-    return trial, recording
+
+
+def _with_events(walk: Recording, model: pin.Model, motion: Trajectory) -> Recording:
+    """Return a recording with the events that its motion and its plates show."""
+    found = events_of_motion(motion["pelvis_tx"], foot_extents(model, motion.values), walk.rate)
+    loads = [np.abs(load.force[:, 2]) for load in plate_loads(walk)]
+    events, moved = set_by_plates(found, loads, LOADED, walk.rate)
+    by_plates = f", {moved} of them from the plates" if moved else ""
+    remark = f"names no foot strikes: found {len(events)} events from the markers{by_plates}"
+    return replace(walk, events=events, remarks=(*walk.remarks, remark))
+
+
+def _aside(walk: Recording, points: tuple[MarkerPoint, ...]) -> dict[Side, np.ndarray]:
+    """Return the sideways position of both feet [m], shape (n,) each."""
+    feet: dict[Side, np.ndarray] = {}
+    for side in SIDES:
+        own = [p.marker for p in points if p.link == f"foot_{SUFFIX[side]}"]
+        paths = np.stack([walk.marker(name)[:, 1] for name in own or [points[0].marker]])
+        feet[side] = np.ma.masked_invalid(paths).mean(axis=0).filled(np.nan)
+    return feet
 
 
 def recorded_trials(
