@@ -18,7 +18,7 @@ from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.inverse.dynamics import MOTION_CUTOFF, low_pass
 from pathwalker_cli.io.c3d_events import Event, EventKind
 
-_SWING: Final = 0.4
+_SWING: Final = 0.2
 """Share of a foot's way before and behind the pelvis that a peak must stand out by."""
 
 _STRIDE: Final = 0.4

@@ -31,6 +31,8 @@ Landmark = Literal["asis", "psis", "knee", "ankle", "toe", "heel", "c7", "clavic
 
 _NEEDED: Final[tuple[Landmark, ...]] = ("asis", "psis", "knee", "ankle", "toe")
 
+_FEET: Final[tuple[Landmark, ...]] = ("toe", "heel")
+
 _LANDMARKS: Final[Mapping[str, Mapping[Landmark, tuple[str, ...]]]] = {
     "Plug-in Gait": {
         "asis": ("{}ASI",), "psis": ("{}PSI",), "knee": ("{}KNE",), "ankle": ("{}ANK",),
@@ -63,6 +65,10 @@ _TRUNK: Final[Mapping[Landmark, tuple[float, float]]] = {
     "clavicle": (0.0306, 0.1781),
 }
 """Trunk markers before and above the lumbar joint, in body heights: those of the published model."""
+
+_LEAN: Final = 0.01
+"""Weight of the trunk markers: they tell how the trunk leans, and must not lift or push the pelvis
+where a trunk is longer than the model's."""
 
 _LEG: Final = 1.1
 """Length of the leg, spine to malleolus, by thigh and shank: 0.9 m for 0.82 m."""
@@ -167,10 +173,11 @@ def set_points(
     def add(landmark: Landmark, side: Side, link: str, at: tuple[float, float]) -> None:
         marker = known.markers.get((landmark, side))
         if marker is not None:
-            points[marker, link] = MarkerPoint(marker, link, at, 1.0)
+            points[marker, link] = MarkerPoint(marker, link, at, _LEAN if link == "trunk" else 1.0)
 
     asis = _spine(patient)
     depth = _pelvis_depth(known, recording) if recording else 0.0
+    feet = _feet(known, recording) if recording else {}
     for side in SIDES:
         add("asis", side, "pelvis", asis)
         add("psis", side, "pelvis", (asis[0] - depth, asis[1]))
@@ -178,9 +185,8 @@ def set_points(
         add("knee", side, f"thigh_{suffix}", (0.0, -patient.length("thigh", side)))
         add("ankle", side, f"shank_{suffix}", (0.0, -patient.length("shank", side)))
         add("ankle", side, f"foot_{suffix}", (0.0, 0.0))
-        foot = _foot(known, side, recording) if recording else {}
-        for landmark in ("toe", "heel"):
-            add(landmark, side, f"foot_{suffix}", foot.get(landmark, (0.0, 0.0)))
+        for landmark in _FEET:
+            add(landmark, side, f"foot_{suffix}", feet.get((landmark, side), (0.0, 0.0)))
     for landmark, (forward, up) in _TRUNK.items():
         for side in SIDES:
             add(landmark, side, "trunk", (forward * patient.height, up * patient.height))
@@ -213,23 +219,32 @@ def _pelvis_depth(known: KnownSet, recording: Recording) -> float:
     return float(np.nanmedian(np.linalg.norm(apart, axis=1)))
 
 
-def _foot(
-    known: KnownSet, side: Side, recording: Recording
-) -> dict[Landmark, tuple[float, float]]:
-    """Return toe and heel marker before and above the ankle of a foot that stands flat [m].
+def _feet(
+    known: KnownSet, recording: Recording
+) -> dict[tuple[Landmark, Side], tuple[float, float]]:
+    """Return toe and heel markers before and above the ankle of a foot that stands flat [m].
 
-    Of a foot that never does, heel and toe marker are taken to be at one height.
+    Of a foot that never does, heel and toe marker are taken to be at one height; without a heel
+    marker, the toe marker is as high beside the ankle as on the foot whose ankle comes lowest.
     """
-    names = {n: known.markers[n, side] for n in ("toe", "heel") if (n, side) in known.markers}
-    ankle = recording.marker(known.markers["ankle", side])[:, [0, 2]]
-    parts = {name: recording.marker(label)[:, [0, 2]] for name, label in names.items()}
-    heights = sum(part[:, 1] for part in (parts.values() if "heel" in parts else (*parts.values(), ankle)))
-    low = np.asarray(heights) <= np.nanquantile(heights, _FLAT)
-    places = {name: np.nanmedian((part - ankle)[low], axis=0) for name, part in parts.items()}
-    if "heel" in places:
-        line = places["toe"] - places["heel"]
-        slope = float(np.arctan2(line[1], line[0]))
-        if abs(slope) > _LEVEL:
+    places: dict[tuple[Landmark, Side], np.ndarray] = {}
+    ankles: dict[Side, float] = {}
+    for side in SIDES:
+        labels = {n: known.markers[n, side] for n in _FEET if (n, side) in known.markers}
+        ankle = recording.marker(known.markers["ankle", side])[:, [0, 2]]
+        parts = {name: recording.marker(label)[:, [0, 2]] for name, label in labels.items()}
+        up = np.sum([part[:, 1] for part in (parts if "heel" in parts else parts | {"": ankle}).values()], axis=0)
+        low = up <= np.nanquantile(up, _FLAT)
+        ankles[side] = float(np.nanmedian(ankle[low, 1]))
+        own = {name: np.nanmedian((part - ankle)[low], axis=0) for name, part in parts.items()}
+        if "heel" in own:
+            line = own["toe"] - own["heel"]
+            slope = float(np.arctan2(line[1], line[0]))
             turn = np.array([[np.cos(slope), np.sin(slope)], [-np.sin(slope), np.cos(slope)]])
-            places = {name: turn @ place for name, place in places.items()}
-    return {name: (float(x), float(z)) for name, (x, z) in places.items()}
+            own = {name: turn @ at if abs(slope) > _LEVEL else at for name, at in own.items()}
+        places |= {(name, side): at for name, at in own.items()}
+    lower = min(SIDES, key=lambda side: ankles[side])
+    for name, side in list(places):
+        if ("heel", side) not in places and (name, lower) in places:
+            places[name, side] = np.array([places[name, side][0], places[name, lower][1]])
+    return {key: (float(x), float(z)) for key, (x, z) in places.items()}

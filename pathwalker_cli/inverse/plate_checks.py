@@ -99,7 +99,8 @@ def plate_faults(
         if not rows or _right(plate, rows, feet):
             continue
         changes = sorted(product(_ORDERS, _SIGNS, _UNITS), key=lambda names: sum(map(bool, names)))
-        single = [names for names in changes if sum(map(bool, names)) == 1]
+        known = np.isfinite(feet[rows[0][0].side].aside).any()
+        single = [n for n in changes if sum(map(bool, n)) == 1 and (known or not n[0])]
         tried = [(what, _changed(plate, *what)) for what in single]
         passed = [(what, other) for what, other in tried if _right(other, rows, feet)]
         if passed:
@@ -136,6 +137,8 @@ def _right(plate: ForcePlate, rows: _Rows, feet: Mapping[Side, Footprint]) -> bo
     up = np.concatenate([plate.force[at, 2] for _, at in rows])
     if up.mean() < 0.0:
         return False
+    if not np.isfinite(feet[rows[0][0].side].aside).any():  # which way x points is a guess then
+        return _distance(plate, rows, feet) < _FOUND
     rolls, drives = [], []
     for _, at in rows:
         progress = np.linspace(-1.0, 1.0, at.size)

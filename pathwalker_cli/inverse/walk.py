@@ -22,6 +22,9 @@ _IN_PLANE: Final = 1e-6
 _SWAY: Final = 0.5
 """Time over which the pelvis' path is averaged before its turns are sought [s]: half a stride."""
 
+_FASTEST: Final = 4.0
+"""Speed beyond which a marker was not carried but jumped, as where recordings are joined [m/s]."""
+
 _UNDER_WAY: Final = 0.3
 """Share of the usual speed from which a pass counts as walking, where a file holds several."""
 
@@ -186,7 +189,8 @@ def _pelvis_path(recording: Recording, points: tuple[MarkerPoint, ...]) -> np.nd
     names = dict.fromkeys(_on(points, "pelvis"))
     markers = np.stack([recording.marker(name)[:, :2] for name in names])
     steps = np.diff(markers, axis=1)
-    known = np.isfinite(steps)
+    known = np.linalg.norm(steps, axis=2, keepdims=True) < _FASTEST / recording.rate
+    known = np.repeat(known, 2, axis=2)
     count = known.sum(axis=0)
     mean = np.where(known, steps, 0.0).sum(axis=0) / np.maximum(count, 1)
     gaps = count[:, 0] == 0
