@@ -173,7 +173,7 @@ def _footprints(
         heel, toe = neutral[side][0]
         length = float(np.linalg.norm(toe - heel))
         sideways = np.full(len(ends), np.nan) if aside is None else aside[side]
-        prints[side] = Footprint(ends + [0.0, _TOES * length], sideways, length)
+        prints[side] = Footprint(ends + np.array([0.0, _TOES * length]), sideways, length)
     return prints
 
 

@@ -81,7 +81,9 @@ def inverse_kinematics(
     values = np.empty((targets.shape[0], model.nq))
     distances = np.empty(targets.shape[:2])
     for frame, target in enumerate(targets):
-        q, residuals = fit.solve(target, q, f"{recording.name}, frame {recording.first_frame + frame}")
+        q, residuals = fit.solve(
+            target, q, f"{recording.name}, frame {recording.first_frame + frame}"
+        )
         values[frame] = q
         distances[frame] = np.hypot(residuals[:, 0], residuals[:, 1])
     distances.setflags(write=False)

@@ -64,7 +64,7 @@ _TRUNK: Final[Mapping[Landmark, tuple[float, float]]] = {
     "c7": (-0.0611, 0.2276),
     "clavicle": (0.0306, 0.1781),
 }
-"""Trunk markers before and above the lumbar joint, in body heights: those of the published model."""
+"""Trunk markers before and above the lumbar joint, in body heights, as in the published model."""
 
 _LEAN: Final = 0.01
 """Weight of the trunk markers: they tell how the trunk leans, and must not lift or push the pelvis
@@ -233,7 +233,10 @@ def _feet(
         labels = {n: known.markers[n, side] for n in _FEET if (n, side) in known.markers}
         ankle = recording.marker(known.markers["ankle", side])[:, [0, 2]]
         parts = {name: recording.marker(label)[:, [0, 2]] for name, label in labels.items()}
-        up = np.sum([part[:, 1] for part in (parts if "heel" in parts else parts | {"": ankle}).values()], axis=0)
+        up = np.sum(
+            [part[:, 1] for part in (parts if "heel" in parts else parts | {"": ankle}).values()],
+            axis=0,
+        )
         low = up <= np.nanquantile(up, _FLAT)
         ankles[side] = float(np.nanmedian(ankle[low, 1]))
         own = {name: np.nanmedian((part - ankle)[low], axis=0) for name, part in parts.items()}

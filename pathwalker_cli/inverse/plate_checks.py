@@ -40,6 +40,15 @@ _SHARE: Final = 0.4
 _PRESSED: Final = 0.2
 """Share of its peak from which the load of a stance says where its centre is."""
 
+_ROLLS: Final = 0.2
+"""Way of the centre of pressure in a stance, in foot lengths, that is surely one; usual is 1."""
+
+_DRIVES: Final = 0.05
+"""Turn of the force from backward to forward, by the vertical one; usual are 0.2 to 0.4."""
+
+_TWICE: Final = 2.0
+"""Ratio of distances that tells one order of the corners from another."""
+
 _FOUND: Final = 0.5
 """Distance of the centre of pressure from where it belongs, in foot lengths, that is still right:
 feet roll over at different times, and toes reach beyond the marker."""
@@ -92,23 +101,23 @@ def plate_faults(
     faults = []
     for index, plate in enumerate(loads):
         rows = [
-            (stance, at)
-            for stance in stances
-            if (at := _pressed(plate, stance, weight)).size > 4  # noqa: PLR2004 - for a slope
+            (stance, at) for stance in stances if (at := _pressed(plate, stance, weight)).size > 4
         ]
-        if not rows or _right(plate, rows, feet):
+        if not rows or _walk(plate, rows, feet).right:
             continue
-        changes = sorted(product(_ORDERS, _SIGNS, _UNITS), key=lambda names: sum(map(bool, names)))
         known = np.isfinite(feet[rows[0][0].side].aside).any()
-        single = [n for n in changes if sum(map(bool, n)) == 1 and (known or not n[0])]
-        tried = [(what, _changed(plate, *what)) for what in single]
-        passed = [(what, other) for what, other in tried if _right(other, rows, feet)]
-        if passed:
-            (order, sign, unit), mended = min(
-                passed, key=lambda item: _distance(item[1], rows, feet)
-            )
-            what = f"its corners seem to be stored {order}" if order else f"it seems to hold {sign}"
-            faults.append(Fault(index, f"it seems to hold {unit}" if unit else what, mended))
+        tried = {
+            names: _changed(plate, *names)
+            for names in product(_ORDERS, _SIGNS, _UNITS)
+            if sum(map(bool, names)) == 1 and (known or not names[0])
+        }
+        walks = {names: _walk(other, rows, feet) for names, other in tried.items()}
+        better = [n for n, walk in walks.items() if walk.clearer_than(_walk(plate, rows, feet))]
+        if better:
+            best = min(better, key=lambda names: walks[names].distance)
+            order, sign, unit = best
+            what = f"its corners seem to be stored {order}" if order else ""
+            faults.append(Fault(index, what or f"it seems to hold {sign or unit}", tried[best]))
     return tuple(faults)
 
 
@@ -132,21 +141,52 @@ def _pressed(plate: ForcePlate, stance: Stance, weight: float) -> np.ndarray:
 _Rows = Sequence[tuple[Stance, np.ndarray]]
 
 
-def _right(plate: ForcePlate, rows: _Rows, feet: Mapping[Side, Footprint]) -> bool:
-    """Return whether a plate agrees with how bodies walk."""
+@dataclass(frozen=True)
+class _Walk:
+    """How the load on a plate behaves in its stances.
+
+    Args:
+        up: Mean vertical force by the mean size of it: 1 or -1, about.
+        rolls: How far the centre of pressure runs ahead, in foot lengths; NaN where the direction
+            of the plate's x is a guess.
+        drives: How the force turns from backward to forward, as a share of the vertical one.
+        distance: How far the centre of pressure is from where it belongs, in foot lengths.
+    """
+
+    up: float
+    rolls: float
+    drives: float
+    distance: float
+
+    @property
+    def right(self) -> bool:
+        """Whether bodies walk like this."""
+        ahead = not (self.rolls < _ROLLS or self.drives < _DRIVES)
+        return self.up > 0.0 and ahead and self.distance < _FOUND
+
+    def clearer_than(self, stored: _Walk) -> bool:
+        """Whether this is right, and what is stored is wrong beyond doubt."""
+        backward = stored.rolls < -_ROLLS and stored.drives < -_DRIVES
+        apart = stored.distance > _TWICE * self.distance
+        return self.right and (stored.up < 0.0 or backward or apart)
+
+
+def _walk(plate: ForcePlate, rows: _Rows, feet: Mapping[Side, Footprint]) -> _Walk:
+    """Return how the load on a plate behaves."""
     up = np.concatenate([plate.force[at, 2] for _, at in rows])
-    if up.mean() < 0.0:
-        return False
-    if not np.isfinite(feet[rows[0][0].side].aside).any():  # which way x points is a guess then
-        return _distance(plate, rows, feet) < _FOUND
+    size = float(np.abs(up).mean())
     rolls, drives = [], []
-    for _, at in rows:
-        progress = np.linspace(-1.0, 1.0, at.size)
-        point, ahead = _point(plate, at)[:, 0], plate.force[at, 0]
-        rolls.append(float((point - point.mean()) @ progress))
-        drives.append(float((ahead - ahead.mean()) @ progress))
-    reversed_ = sum(rolls) < 0.0 and sum(drives) < 0.0
-    return not reversed_ and sum(drives) > 0.0 and _distance(plate, rows, feet) < _FOUND
+    for stance, at in rows:
+        foot, progress = feet[stance.side], np.linspace(-0.5, 0.5, at.size)
+        rolls.append(np.polyfit(progress, _point(plate, at)[:, 0], 1)[0] / foot.length)
+        drives.append(np.polyfit(progress, plate.force[at, 0], 1)[0] / size)
+    known = np.isfinite(feet[rows[0][0].side].aside).any()
+    return _Walk(
+        float(up.mean()) / size,
+        float(np.mean(rolls)) if known else np.nan,
+        float(np.mean(drives)) if known else np.nan,
+        _distance(plate, rows, feet),
+    )
 
 
 def _distance(plate: ForcePlate, rows: _Rows, feet: Mapping[Side, Footprint]) -> float:

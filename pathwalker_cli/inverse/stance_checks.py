@@ -43,7 +43,7 @@ outside, part of the foot stood off the plate or something else stood on it."""
 JUMP: Final = 0.145
 """Distance by which the body's whole weight may seem to jump ahead on a plate when the other foot
 strikes, in foot lengths; 2 cm for the shipped patient: a second foot 0.4 m ahead shows from a
-twentieth of the weight on.  There a foot that stands alone gives up to 0.8 cm, two feet 3 and more."""
+twentieth of the weight on.  A foot that stands alone there gives up to 0.8 cm, two feet 3."""
 
 REACH: Final = 0.5
 """Distance from a plate at which the middle line of a foot surely does not touch it, in foot

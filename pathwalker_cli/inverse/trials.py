@@ -21,7 +21,7 @@ from pathwalker_cli.inverse.dynamics import (
 )
 from pathwalker_cli.inverse.forces import foot_extents, ground_forces, plate_loads
 from pathwalker_cli.inverse.found_events import events_of_motion, set_by_plates
-from pathwalker_cli.inverse.kinematics import MarkerResiduals, inverse_kinematics
+from pathwalker_cli.inverse.kinematics import MarkerResiduals
 from pathwalker_cli.inverse.marker_sets import KnownSet, recognised, set_points
 from pathwalker_cli.inverse.markers import (
     Gap,
@@ -30,6 +30,7 @@ from pathwalker_cli.inverse.markers import (
     load_marker_set,
     marker_points,
 )
+from pathwalker_cli.inverse.misplaced import robust_kinematics
 from pathwalker_cli.inverse.published import AVERAGED_TRIALS, flagged_cycles, published_torques
 from pathwalker_cli.inverse.stance_checks import LOADED, StanceForce
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, RecordedConfig
@@ -41,7 +42,6 @@ from pathwalker_cli.io.c3d_checks import (
     readable_recording,
     require_plates,
 )
-from pathwalker_cli.io.c3d_events import Event
 from pathwalker_cli.io.recordings import (
     CompactRecording,
     foot_columns,
@@ -237,7 +237,9 @@ def _walk_trial(
     names = tuple(point.marker for point in points)
     walk, gaps = bridge_gaps(walk, names, config.longest_gap)
     model: pin.Model = pinocchio_model(patient, condition)
-    motion, distances = inverse_kinematics(model, walk, points)
+    motion, distances, doubts = robust_kinematics(
+        model, walk, points, patient.height, config.longest_gap
+    )
     if not any(event.kind == "foot_strike" for event in walk.events):
         walk = _with_events(walk, model, motion)
     aside = None if is_projected(walk, points) else _aside(walk, points)
@@ -256,7 +258,7 @@ def _walk_trial(
         gaps=gaps,
         first_frame=walk.first_frame,
         remarks=walk.remarks,
-        doubts=forces.remarks if forces else (),
+        doubts=(*doubts, *(forces.remarks if forces else ())),
     )
 
 

@@ -22,7 +22,7 @@ _IN_PLANE: Final = 1e-6
 _SWAY: Final = 0.5
 """Time over which the pelvis' path is averaged before its turns are sought [s]: half a stride."""
 
-_FASTEST: Final = 4.0
+_FASTEST: Final = 10.0
 """Speed beyond which a marker was not carried but jumped, as where recordings are joined [m/s]."""
 
 _UNDER_WAY: Final = 0.3

@@ -177,8 +177,12 @@ def _check_markers(recording: Recording, markers: Sequence[str], path: Path) -> 
         raise DataError(
             f"has {recording.markers.count(twice[0])} markers {', '.join(twice)}",
             where=str(path),
-            allowed=f"one subject of {', '.join(recording.subjects)}" if several else "one of a name",
-            mend="name the subject (--subject)" if several else "take the wrong one out of the file",
+            allowed=f"one subject of {', '.join(recording.subjects)}"
+            if several
+            else "one of a name",
+            mend="name the subject (--subject)"
+            if several
+            else "take the wrong one out of the file",
         )
     unseen = [n for n in markers if not np.isfinite(recording.marker(n)).any()]
     if unseen:

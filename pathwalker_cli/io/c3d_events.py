@@ -81,7 +81,8 @@ def read_events(
     ]
     for shift in (first_frame - 1, 0):  # 0: counted from the first frame that was kept
         events = [
-            Event(side, kind, math.ceil(round(time * rate, 3)) - shift) for side, kind, time in named
+            Event(side, kind, math.ceil(round(time * rate, 3)) - shift)
+            for side, kind, time in named
         ]
         inside = [event for event in events if 0 <= event.frame < frames]
         if inside:

@@ -98,7 +98,7 @@ def _parameters(group: Mapping[str, Any], index: int) -> dict[str, np.ndarray]:
         for name in ("CORNERS", "ORIGIN", "CHANNEL")
     }
     matrices = np.asarray(group.get("CAL_MATRIX", {"value": ()})["value"], dtype=float)
-    if matrices.ndim == 3 and index < matrices.shape[2]:  # noqa: PLR2004 - rows, columns, plates
+    if matrices.ndim == 3 and index < matrices.shape[2]:
         values["CAL_MATRIX"] = matrices[..., index]
     return values
 
@@ -159,7 +159,7 @@ def _wrench_of_eight(channels: np.ndarray, a: float, b: float) -> np.ndarray:
 
 
 def _moment_unit(content: Any, columns: np.ndarray, unit: float, calibrated: bool) -> float:
-    """Return what the file's moments are multiplied with [m]: by their own unit, else the file's."""
+    """Return the length in the unit of the moments [m]: their own, else the file's."""
     group = content["parameters"]["ANALOG"]
     units = [str(text) for text in group["UNITS"]["value"]] if "UNITS" in group else []
     if not calibrated and columns[-1] < len(units):
