@@ -251,7 +251,7 @@ C3D: Final[dict[str, Callable[[bytes], bytes]]] = {
     "65535 analog samples": lambda data: data[:4] + b"\xff\xff" + data[6:],
     "65534 frames": lambda data: data[:8] + struct.pack("<H", 65534) + data[10:],
     "data elsewhere": lambda data: data[:16] + b"\xff\xff" + data[18:],
-    "no scale": renamed(b"SCALE&", b"LCALE&"),
+    "no scale": renamed(b"SCALE\x1e", b"LCALE\x1e"),
     "no offset": renamed(b"OFFSET", b"OFFSEX"),
     "no labels": renamed(b"LABELS", b"LABELX"),
     "no units": renamed(b"UNITS", b"UNITX"),

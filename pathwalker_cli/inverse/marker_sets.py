@@ -114,9 +114,9 @@ def recognised(recording: Recording, where: str) -> KnownSet | None:
     complete = [known for known in found if not _missing(known)]
     if complete:
         return max(complete, key=lambda known: len(known.markers))
-    if has_own:
-        return None
     closest = min(found, key=lambda known: len(_missing(known)))
+    if len(own - set(recording.markers)) <= len(_missing(closest)):
+        return None
     lacks = ", ".join(_missing(closest))
     raise DataError(
         f"shows no marker set that is known; closest is {closest.name}, which lacks {lacks}",

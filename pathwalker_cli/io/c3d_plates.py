@@ -187,13 +187,10 @@ def _analog(content: Any) -> np.ndarray:
     """Return the analog channels in physical units, shape (samples, channels)."""
     group = content["parameters"]["ANALOG"]
     channels = np.array(content["data"]["analogs"][0].T, dtype=float)
-    offset, scale = (
-        np.resize(np.asarray(group[name]["value"], dtype=float), channels.shape[1])
-        if name in group and np.size(group[name]["value"]) >= channels.shape[1]
-        else np.full(channels.shape[1], default)
-        for name, default in (("OFFSET", 0.0), ("SCALE", 1.0))
-    )
-    general = float(group["GEN_SCALE"]["value"][0]) if "GEN_SCALE" in group else 1.0
+    used = channels.shape[1]
+    offset = np.asarray(group["OFFSET"]["value"], dtype=float)[:used]
+    scale = np.asarray(group["SCALE"]["value"], dtype=float)[:used]
+    general = float(group["GEN_SCALE"]["value"][0])
     form = group["FORMAT"]["value"] if "FORMAT" in group else []
     unsigned = bool(form) and str(form[0]).strip().upper() == "UNSIGNED"
     return channels - analog_offset_error(offset, scale * general, unsigned)
