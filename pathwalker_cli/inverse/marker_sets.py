@@ -94,6 +94,11 @@ class KnownSet:
     name: str
     markers: Mapping[tuple[Landmark, Side], str]
 
+    def middle(self, landmark: Landmark, recording: Recording) -> np.ndarray:
+        """Return the middle of both sides' landmarks [m], shape (n, 3)."""
+        sides = [recording.marker(self.markers[landmark, side]) for side in SIDES]
+        return np.asarray((sides[0] + sides[1]) / 2.0)
+
 
 def recognised(recording: Recording, where: str) -> KnownSet | None:
     """Return the marker set that a recording shows, None for the shipped one.
@@ -158,13 +163,13 @@ def _missing(known: KnownSet) -> list[str]:
 
 
 def set_points(
-    known: KnownSet, patient: Patient, recording: Recording | None = None
+    known: KnownSet, patient: Patient | None = None, recording: Recording | None = None
 ) -> tuple[MarkerPoint, ...]:
     """Return where the markers of a known set sit on a patient's walker.
 
     Args:
         known: The set.
-        patient: The patient.
+        patient: The patient; without one only the links count, and all places are 0.
         recording: A pass in the walking plane, which tells the depth of the pelvis and where the
             foot markers are around the ankles; without it these are 0.
     """
@@ -175,51 +180,57 @@ def set_points(
         if marker is not None:
             points[marker, link] = MarkerPoint(marker, link, at, _LEAN if link == "trunk" else 1.0)
 
-    asis = _spine(patient)
+    asis = _spine(patient) if patient else (0.0, 0.0)
+    thighs, shanks = ({s: patient.length(n, s) if patient else 0.0 for s in SIDES}
+                      for n in ("thigh", "shank"))  # fmt: skip
+    height = patient.height if patient else 0.0
     depth = _pelvis_depth(known, recording) if recording else 0.0
-    feet = _feet(known, recording) if recording else {}
+    feet = foot_places(known, recording) if recording else {}
     for side in SIDES:
         add("asis", side, "pelvis", asis)
         add("psis", side, "pelvis", (asis[0] - depth, asis[1]))
         suffix = SUFFIX[side]
-        add("knee", side, f"thigh_{suffix}", (0.0, -patient.length("thigh", side)))
-        add("ankle", side, f"shank_{suffix}", (0.0, -patient.length("shank", side)))
+        add("knee", side, f"thigh_{suffix}", (0.0, -thighs[side]))
+        add("ankle", side, f"shank_{suffix}", (0.0, -shanks[side]))
         add("ankle", side, f"foot_{suffix}", (0.0, 0.0))
         for landmark in _FEET:
             add(landmark, side, f"foot_{suffix}", feet.get((landmark, side), (0.0, 0.0)))
     for landmark, (forward, up) in _TRUNK.items():
         for side in SIDES:
-            add(landmark, side, "trunk", (forward * patient.height, up * patient.height))
+            add(landmark, side, "trunk", (forward * height, up * height))
     return tuple(points.values())
 
 
-def _spine(patient: Patient) -> tuple[float, float]:
-    """Return where the anterior spines are before and above the pelvis origin [m].
+def hip_centre(leg: float, width: float = 0.0) -> tuple[float, float, float]:
+    """Return how far a hip joint is behind, beside and below the middle of the front spines [m].
 
-    That is where the hip joints are by the regression of Davis et al. (1991), which takes the
-    length of the leg.
+    Along the axes of the pelvis, by the regression of Davis et al. (1991).
+
+    Args:
+        leg: Length of the leg, spine to malleolus [m].
+        width: Distance between the front spines [m].
     """
-    leg = _LEG * sum(patient.length(n, s) for n in ("thigh", "shank") for s in SIDES) / 2.0
     size, depth = 0.115 * leg - 0.0153, 0.1288 * leg - 0.04856 + 0.007
     theta, beta = np.radians(28.4), np.radians(18.0)
     behind = depth * np.cos(beta) - size * np.cos(theta) * np.sin(beta)
     below = depth * np.sin(beta) + size * np.cos(theta) * np.cos(beta)
-    return float(behind), float(below - patient.length("hip_drop", "right"))
+    return float(behind), float(width / 2.0 - size * np.sin(theta)), float(below)
 
 
-def _middle(known: KnownSet, landmark: Landmark, recording: Recording) -> np.ndarray:
-    """Return the middle of both sides' landmarks [m], shape (n, 3)."""
-    sides = [recording.marker(known.markers[landmark, side]) for side in SIDES]
-    return np.asarray((sides[0] + sides[1]) / 2.0)
+def _spine(patient: Patient) -> tuple[float, float]:
+    """Return where the anterior spines are before and above the pelvis origin [m]."""
+    leg = _LEG * sum(patient.length(n, s) for n in ("thigh", "shank") for s in SIDES) / 2.0
+    behind, _, below = hip_centre(leg)
+    return behind, below - patient.length("hip_drop", "right")
 
 
 def _pelvis_depth(known: KnownSet, recording: Recording) -> float:
     """Return the distance between front and back of the pelvis [m]."""
-    apart = _middle(known, "asis", recording) - _middle(known, "psis", recording)
+    apart = known.middle("asis", recording) - known.middle("psis", recording)
     return float(np.nanmedian(np.linalg.norm(apart, axis=1)))
 
 
-def _feet(
+def foot_places(
     known: KnownSet, recording: Recording
 ) -> dict[tuple[Landmark, Side], tuple[float, float]]:
     """Return toe and heel markers before and above the ankle of a foot that stands flat [m].
@@ -248,6 +259,6 @@ def _feet(
         places |= {(name, side): at for name, at in own.items()}
     lower = min(SIDES, key=lambda side: ankles[side])
     for name, side in list(places):
-        if ("heel", side) not in places and (name, lower) in places:
+        if ("heel", side) not in places:
             places[name, side] = np.array([places[name, side][0], places[name, lower][1]])
     return {key: (float(x), float(z)) for key, (x, z) in places.items()}

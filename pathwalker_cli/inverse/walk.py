@@ -47,7 +47,7 @@ def walks(recording: Recording, points: tuple[MarkerPoint, ...]) -> tuple[Record
         StandingError: If nobody walks.
         DataError: If no frame shows enough markers.
     """
-    recording = _upright(_shown(recording, points), points)
+    recording = upright(_shown(recording, points), points)
     path = _pelvis_path(recording, points)
     runs = _passes(path, recording.rate)
     if not runs:
@@ -161,7 +161,7 @@ def _shown(recording: Recording, points: tuple[MarkerPoint, ...]) -> Recording:
     return replace(kept, remarks=(*recording.remarks, remark))
 
 
-def _upright(recording: Recording, points: tuple[MarkerPoint, ...]) -> Recording:
+def upright(recording: Recording, points: tuple[MarkerPoint, ...]) -> Recording:
     """Return a recording whose z points from the feet to the trunk."""
     high = _on(points, "pelvis", "trunk")
     low = _on(points, "foot_r", "foot_l")
