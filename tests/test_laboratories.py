@@ -14,8 +14,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from pathwalker_cli.cli import cli
+from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.body import measured_body
 from pathwalker_cli.inverse.marker_sets import recognised
 from pathwalker_cli.inverse.study import Paths, RecordedConfig
 from pathwalker_cli.inverse.text import trial_notes, trial_warnings
@@ -336,6 +340,53 @@ def test_a_foot_beside_the_plate_does_not_strike_it(good: Trial, tmp_path: Path)
     write_c3d(tmp_path / "walk.c3d", replace(walk(), plates=(replace(plate, corners=wide),)))
     (trial,) = evaluated(tmp_path / "walk.c3d")
     assert [s.reason for s in trial.stances if s.plate is not None] == [""]
+
+
+def with_numbers(file: Any) -> None:
+    """Add what processing programs keep about the subject, lengths in mm."""
+    file.add_parameter("PROCESSING", "Bodymass", [24.7])
+    file.add_parameter("PROCESSING", "Height", [1250.0])
+
+
+def test_a_folder_from_a_recording(tmp_path: Path) -> None:
+    """Lengths of the made walk are those of the shipped patient, hips 4 cm further ahead."""
+    path = edited(tmp_path / "static.c3d", with_numbers, relabelled({}))
+    words = ["init", str(tmp_path / "new"), str(path), "--from", str(path), "--sex", "male"]
+    refused = CliRunner().invoke(cli, words)
+    assert "no recording tells a child's age and sex" in refused.output
+    result = CliRunner().invoke(cli, [*words, "--age", "6"])
+    assert result.exception is None, result.output
+    assert "body mass: PROCESSING:Bodymass of static" in result.output
+    assert (tmp_path / "new" / "c3d" / "barefoot" / "static.c3d").is_file()
+    made, shipped = load_patient(tmp_path / "new"), load_patient(SHIPPED)
+    assert (made.sex, made.age, made.body_mass, made.height) == ("male", 6.0, 24.7, 1.25)
+    for side in SIDES:
+        for name, error in (("shank", 0.003), ("foot", 0.003), ("thigh", 0.05)):
+            assert made.length(name, side) == pytest.approx(shipped.length(name, side), abs=error)
+        heel, toe = made.contacts("barefoot")[side].heel, made.contacts("barefoot")[side].toe
+        assert toe[0] - heel[0] == pytest.approx(shipped.length("foot", side), abs=0.004)
+    (trial,) = evaluated(path, made)
+    assert trial.markers is not None
+    assert trial.markers.mean < 0.02
+
+
+def test_a_recording_without_a_known_set_makes_no_folder(tmp_path: Path) -> None:
+    write_c3d(tmp_path / "static.c3d", walk())
+    with pytest.raises(DataError, match="lacks a marker on one of the front spines"):
+        measured_body(tmp_path / "static.c3d")
+
+
+def test_plates_weigh_who_stands_on_them(tmp_path: Path) -> None:
+    (plate,) = walk().plates
+    force = np.zeros_like(plate.force)
+    force[:, 2] = 245.0
+    still = relabelled({})
+    still = replace(still, plates=(replace(plate, force=force, moment=np.zeros_like(force)),))
+    write_c3d(tmp_path / "static.c3d", still)
+    body = measured_body(tmp_path / "static.c3d")
+    assert body.mass == pytest.approx(25.0, abs=0.1)
+    assert body.height is not None
+    assert body.height == pytest.approx(1.25, abs=0.15), "from the neck, of a child in crouch"
 
 
 # --- files of real laboratories -------------------------------------------------------------------

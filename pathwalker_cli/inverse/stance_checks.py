@@ -160,7 +160,7 @@ def off_plate(foot: Footprint, plates: Sequence[ForcePlate]) -> np.ndarray:
 
     It is 0 on the plate, and where the foot's sideways position is unknown.
     """
-    line = np.linspace(*foot.ends.T, 5)
+    line = np.linspace(foot.ends[:, 0], foot.ends[:, 1], 5)
     points = np.stack([line, np.broadcast_to(foot.aside, line.shape)], axis=-1)
     gaps = []
     for plate in plates:
