@@ -312,6 +312,9 @@ def relabelled(names: dict[str, str]) -> Recording:
     every = (*walk().markers, "RASI", "SACR2")
     copied = [walk().marker("LASI"), walk().marker("SACR")]
     positions = np.concatenate([walk().positions, np.stack(copied, axis=1)], axis=1)
+    apart = {"LASI": 0.1, "RASI": -0.1} | ({"SACR": 0.04, "SACR2": -0.04} if names else {})
+    for name, aside in apart.items():
+        positions[:, every.index(name), 1] += aside
     return replace(walk(), markers=tuple(names.get(n, n) for n in every), positions=positions)
 
 

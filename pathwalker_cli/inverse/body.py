@@ -26,7 +26,7 @@ from pathwalker_cli.inverse.marker_sets import (
 )
 from pathwalker_cli.inverse.walk import about_vertical, turned, upright
 from pathwalker_cli.io.c3d import Recording
-from pathwalker_cli.io.c3d_checks import readable_recording
+from pathwalker_cli.io.c3d_checks import check_markers, readable_recording
 from pathwalker_cli.patient.proportions import ANKLE_HEIGHT
 
 _MASS: Final = ("bodymass", "mass", "weight")
@@ -34,6 +34,10 @@ _HEIGHT: Final = ("height", "bodyheight")
 _CERVICAL: Final = 0.865
 _HEIGHTS: Final = (0.5, 2.2)
 """Standing heights that are read as such [m]; a file may hold them in mm or cm."""
+_CHILD: Final = 1.4
+"""Height by which units are judged as long as nothing is known [m]; they are off by 10 or 1000."""
+_WIDTHS: Final = (0.08, 0.45)
+"""Distances of the front spines that can be [m]."""
 _ANKLES: Final = (0.02, 0.13)
 """Heights of an ankle marker over the floor that can be [m]; otherwise z = 0 is not the floor."""
 
@@ -82,6 +86,7 @@ def measured_body(
             allowed="LASI and RASI, or their names in other marker sets",
             mend="use init without --from and measure lengths by tape",
         )
+    check_markers(recording, [*known.markers.values()], height or _CHILD, path)
     recording = _facing(recording, known)
     sources: list[str] = []
     mass = _told(recording, _MASS, mass, "body mass", sources)
@@ -163,7 +168,15 @@ def _lengths(recording: Recording, known: KnownSet) -> dict[str, tuple[float, fl
     ahead = _unit(front - back)
     left = spines[1] - spines[0]
     left = left - (left * ahead).sum(axis=1, keepdims=True) * ahead
-    width, left = float(np.nanmedian(np.linalg.norm(left, axis=1))), _unit(left)
+    width = _apart(left, np.zeros(3))
+    if not _WIDTHS[0] <= width <= _WIDTHS[1]:
+        raise DataError(
+            f"has front spines of the pelvis {width:.2f} m apart",
+            where=recording.name,
+            allowed=f"{_WIDTHS[0]} to {_WIDTHS[1]} m",
+            mend="check the pelvis' markers; those laid into a plane tell no lengths",
+        )
+    left = _unit(left)
     up = np.cross(ahead, left)
     every: dict[str, list[float]] = {"thigh": [], "shank": [], "foot": []}
     for side, spine, sign in zip(SIDES, spines, (-1.0, 1.0), strict=True):
