@@ -12,6 +12,7 @@ import pytest
 
 from pathwalker_cli.conventions import COORDINATES, GRAVITY, Side
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.dynamics import low_pass, smooth_rates
 from pathwalker_cli.inverse.forces import (
     centre_of_pressure,
@@ -20,7 +21,6 @@ from pathwalker_cli.inverse.forces import (
 )
 from pathwalker_cli.inverse.published import wrench_axis_at_ground
 from pathwalker_cli.inverse.study import RecordedConfig
-from pathwalker_cli.inverse.trials import c3d_trials
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.c3d_events import Event
 from pathwalker_cli.io.c3d_plates import ForcePlate, plate_axes

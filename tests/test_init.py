@@ -15,13 +15,13 @@ from pydantic import BaseModel
 
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
+from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.recorded import with_block
 from pathwalker_cli.inverse.study import (
     RecordedConfig,
     load_inverse_dynamics,
     load_inverse_kinematics,
 )
-from pathwalker_cli.inverse.trials import c3d_trials
 from pathwalker_cli.io.commented_yaml import entries, reasons
 from pathwalker_cli.io.fields import Sides
 from pathwalker_cli.paths import shipped

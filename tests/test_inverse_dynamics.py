@@ -12,6 +12,7 @@ import pytest
 
 from pathwalker_cli.conventions import COORDINATES, GRAVITY, Condition
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.cycles import GaitCycle, Stance, cycle_band, resampled
 from pathwalker_cli.inverse.dynamics import inverse_dynamics
 from pathwalker_cli.inverse.forces import force_columns
@@ -36,7 +37,8 @@ from pathwalker_cli.inverse.strengths import (
     strengths_of,
 )
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, RecordedConfig
-from pathwalker_cli.inverse.trials import Trial, c3d_trials, dynamics_trials, with_torques
+from pathwalker_cli.inverse.trial import Trial
+from pathwalker_cli.inverse.trials import dynamics_trials, with_torques
 from pathwalker_cli.io.c3d import read_c3d
 from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.model.urdf import pinocchio_model

@@ -20,10 +20,12 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.body import measured_body
+from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.marker_sets import recognised
 from pathwalker_cli.inverse.study import Paths, RecordedConfig
 from pathwalker_cli.inverse.text import trial_notes, trial_warnings
-from pathwalker_cli.inverse.trials import Trial, c3d_trials, kinematics_trials
+from pathwalker_cli.inverse.trial import Trial
+from pathwalker_cli.inverse.trials import kinematics_trials
 from pathwalker_cli.inverse.walk import about_vertical, cut, turned
 from pathwalker_cli.io.c3d import Recording, read_c3d
 from pathwalker_cli.io.c3d_write import write_c3d

@@ -22,6 +22,7 @@ from pathwalker_cli.checking.studies import check_batch, check_study
 from pathwalker_cli.config import StudyConfig, config_content, find_config
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import ConfigError, placed
+from pathwalker_cli.inverse.c3d_trials import read_markers
 from pathwalker_cli.inverse.markers import MarkerSet, load_marker_set, marker_points
 from pathwalker_cli.inverse.study import (
     InverseDynamicsConfig,
@@ -30,7 +31,7 @@ from pathwalker_cli.inverse.study import (
     load_inverse_dynamics,
     load_inverse_kinematics,
 )
-from pathwalker_cli.inverse.trials import read_markers, require_trials
+from pathwalker_cli.inverse.trials import require_trials
 from pathwalker_cli.io.c3d_checks import c3d_files
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.yaml_file import load_yaml

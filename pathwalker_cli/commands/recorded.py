@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
     from pathwalker_cli.inverse.strengths import StrengthTable
     from pathwalker_cli.inverse.study import RecordedConfig
-    from pathwalker_cli.inverse.trials import Progress, Trial
+    from pathwalker_cli.inverse.trial import Trial
+    from pathwalker_cli.inverse.trials import Progress
     from pathwalker_cli.patient import Patient
 
     Config = TypeVar("Config", bound=RecordedConfig)

@@ -13,7 +13,7 @@ from rich.text import Text
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.inverse.residuals import COMPONENTS, ResidualTable
 from pathwalker_cli.inverse.strengths import StrengthTable
-from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.inverse.trial import Trial
 
 
 def trials_renderable(trials: Iterable[Trial]) -> Table:
