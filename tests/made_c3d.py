@@ -11,6 +11,7 @@ from pathwalker_cli.inverse.kinematics import marker_paths
 from pathwalker_cli.inverse.markers import load_marker_set, marker_points
 from pathwalker_cli.io import c3d_write
 from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.io.c3d_checks import check_markers, readable_recording
 from pathwalker_cli.io.c3d_events import Event
 from pathwalker_cli.io.c3d_plates import METRES, ForcePlate
 from pathwalker_cli.model.urdf import pinocchio_model
@@ -65,6 +66,13 @@ def write_c3d(
                           plates, PER_FRAME)  # fmt: skip
     c3d_write.write_c3d(path, recording, unit)
     return path
+
+
+def checked(path: Path, markers: tuple[str, ...], height: float) -> Recording:
+    """Read a recording and check that these markers can be evaluated."""
+    recording = readable_recording(path)
+    check_markers(recording, markers, height, path)
+    return recording
 
 
 def _plate(frames: int, nan_channel: bool, flat: bool) -> ForcePlate:

@@ -292,6 +292,34 @@ def test_forces_on_the_plate_are_named_and_mended(good: Trial, tmp_path: Path) -
     assert mended.stances == good.stances
 
 
+def test_a_zero_level_is_named_and_mended(good: Trial, tmp_path: Path) -> None:
+    lifted = tuple(replace(p, force=p.force + np.array([3.0, -2.0, 80.0])) for p in walk().plates)
+    write_c3d(tmp_path / "walk.c3d", replace(walk(), plates=lifted))
+    (trial,) = evaluated(tmp_path / "walk.c3d")
+    assert "plate 1 is not used: its zero level seems to be off by 80 N" in said(trial)
+    (mended,) = evaluated(tmp_path / "walk.c3d", mend_plates=True)
+    assert mended.stances == good.stances
+    assert mended.forces is not None
+    assert good.forces is not None
+    assert mended.forces.values == pytest.approx(good.forces.values, abs=0.1, nan_ok=True)
+
+
+def test_walks_backwards_exchanged_sides_and_bends_are_named(good: Trial, tmp_path: Path) -> None:
+    still = ("faces away", "lie on the right", "bends by")
+    assert not any(words in said(good) for words in still)
+    turn = np.radians(np.linspace(0.0, 60.0, len(walk().positions)))
+    bent = walk().positions.copy()
+    bent[..., 1] += (np.cumsum(np.tan(turn) * np.gradient(walk().positions[:, 0, 0])))[:, None]
+    recordings = (
+        replace(walk(), positions=walk().positions[::-1]),
+        replace(walk(), positions=walk().positions * [1.0, -1.0, 1.0]),
+        replace(walk(), positions=bent),
+    )
+    for recording, words in zip(recordings, still, strict=True):
+        write_c3d(tmp_path / "walk.c3d", replace(recording, plates=()))
+        assert words in said(evaluated(tmp_path / "walk.c3d")[0])
+
+
 RENAMED: dict[str, dict[str, str]] = {
     "Plug-in Gait with a sacral marker": {},
     "Helen Hayes": {

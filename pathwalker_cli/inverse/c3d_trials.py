@@ -23,7 +23,7 @@ from pathwalker_cli.inverse.misplaced import robust_kinematics
 from pathwalker_cli.inverse.stance_checks import LOADED
 from pathwalker_cli.inverse.study import RecordedConfig
 from pathwalker_cli.inverse.trial import Trial
-from pathwalker_cli.inverse.walk import is_projected, walks
+from pathwalker_cli.inverse.walk import is_projected, orientation_doubts, walks
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.c3d_checks import check_markers, readable_recording
 from pathwalker_cli.model.urdf import pinocchio_model
@@ -46,7 +46,7 @@ def c3d_trials(
     raw, known, points = read_markers(path, patient, condition, config)
     trials = []
     for walk in walks(raw, points):
-        placed = set_points(known, patient, walk) if known else points
+        placed = set_points(known, patient, walk, condition) if known else points
         trials.append((_walk_trial(walk, placed, patient, condition, config), raw))
     return trials
 
@@ -106,7 +106,11 @@ def _walk_trial(
         gaps=gaps,
         first_frame=walk.first_frame,
         remarks=walk.remarks,
-        doubts=(*doubts, *(forces.remarks if forces else ())),
+        doubts=(
+            *orientation_doubts(walk, points),
+            *doubts,
+            *(forces.remarks if forces else ()),
+        ),
     )
 
 

@@ -21,11 +21,12 @@ from typing import Final, Literal
 
 import numpy as np
 
-from pathwalker_cli.conventions import SIDES, SUFFIX, Side
+from pathwalker_cli.conventions import SIDES, SUFFIX, Condition, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.patient import Patient
+from pathwalker_cli.patient.blocks import FootPoints
 
 Landmark = Literal["asis", "psis", "knee", "ankle", "toe", "heel", "c7", "clavicle"]
 
@@ -163,7 +164,10 @@ def _missing(known: KnownSet) -> list[str]:
 
 
 def set_points(
-    known: KnownSet, patient: Patient | None = None, recording: Recording | None = None
+    known: KnownSet,
+    patient: Patient | None = None,
+    recording: Recording | None = None,
+    condition: Condition = "barefoot",
 ) -> tuple[MarkerPoint, ...]:
     """Return where the markers of a known set sit on a patient's walker.
 
@@ -172,6 +176,7 @@ def set_points(
         patient: The patient; without one only the links count, and all places are 0.
         recording: A pass in the walking plane, which tells the depth of the pelvis and where the
             foot markers are around the ankles; without it these are 0.
+        condition: What is worn: a shoe that stands flat may hold the foot at a pitch.
     """
     points: dict[tuple[str, str], MarkerPoint] = {}
 
@@ -194,11 +199,21 @@ def set_points(
         add("ankle", side, f"shank_{suffix}", (0.0, -shanks[side]))
         add("ankle", side, f"foot_{suffix}", (0.0, 0.0))
         for landmark in _FEET:
-            add(landmark, side, f"foot_{suffix}", feet.get((landmark, side), (0.0, 0.0)))
+            at = feet.get((landmark, side), (0.0, 0.0))
+            if patient:
+                at = _pitched(at, patient.contacts(condition)[side])
+            add(landmark, side, f"foot_{suffix}", at)
     for landmark, (forward, up) in _TRUNK.items():
         for side in SIDES:
             add(landmark, side, "trunk", (forward * height, up * height))
     return tuple(points.values())
+
+
+def _pitched(at: tuple[float, float], sole: FootPoints) -> tuple[float, float]:
+    """Return a place around the ankle of a foot that stands flat [m] in the frame of the foot."""
+    pitch = np.arctan2(sole.toe[1] - sole.heel[1], sole.toe[0] - sole.heel[0])
+    cos, sin = np.cos(pitch), np.sin(pitch)
+    return float(cos * at[0] - sin * at[1]), float(sin * at[0] + cos * at[1])
 
 
 def hip_centre(leg: float, width: float = 0.0) -> tuple[float, float, float]:

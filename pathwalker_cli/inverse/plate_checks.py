@@ -34,6 +34,12 @@ _SIGNS: Final = {"": 1.0, "the forces on the plate, not on the body": -1.0}
 _UNITS: Final = {"": 1.0, "its moments 1000 times too large": 1e-3, "its moments 1000 times too "
                  "small": 1e3}  # fmt: skip
 
+_IDLE: Final = 0.1
+"""Share of the frames, those of least load, in which nobody stands on a plate."""
+
+_ZERO: Final = 20.0
+"""Vertical force below which a plate counts as unloaded [N], and range of an unloaded one."""
+
 _SHARE: Final = 0.4
 """Peak load, as a share of the body's weight, from which a stance tells about a plate."""
 
@@ -102,6 +108,9 @@ def plate_faults(
     """
     faults = []
     for index, plate in enumerate(loads):
+        if level := _zero_level(plate):
+            faults.append(Fault(index, *level))
+            continue
         rows = [
             (stance, at) for stance in stances if (at := _pressed(plate, stance, weight)).size > 4
         ]
@@ -121,6 +130,18 @@ def plate_faults(
             what = f"its corners seem to be stored {order}" if order else ""
             faults.append(Fault(index, what or f"it seems to hold {sign or unit}", tried[best]))
     return tuple(faults)
+
+
+def _zero_level(plate: ForcePlate) -> tuple[str, ForcePlate] | None:
+    """Return by how much a plate that is never unloaded is off, and how it would be right."""
+    size = np.abs(plate.force[:, 2])
+    lowest = size <= np.quantile(size, _IDLE)
+    level = np.median(plate.force[lowest], axis=0)
+    if size.min() < _ZERO or np.ptp(plate.force[lowest, 2]) > _ZERO:
+        return None
+    moment = plate.moment - np.median(plate.moment[lowest], axis=0)
+    what = f"its zero level seems to be off by {level[2]:.0f} N"
+    return what, replace(plate, force=plate.force - level, moment=moment)
 
 
 def _changed(plate: ForcePlate, order: str, sign: str, unit: str) -> ForcePlate:

@@ -22,6 +22,9 @@ _IN_PLANE: Final = 1e-6
 _SWAY: Final = 0.5
 """Time over which the pelvis' path is averaged before its turns are sought [s]: half a stride."""
 
+_BEND: Final = 20.0
+"""Angle between the halves of a path from which one plane does not hold it [deg]."""
+
 _FASTEST: Final = 10.0
 """Speed beyond which a marker was not carried but jumped, as where recordings are joined [m/s]."""
 
@@ -126,6 +129,37 @@ def is_projected(recording: Recording, points: tuple[MarkerPoint, ...]) -> bool:
     Then they may have been turned as well, and say nothing about the plates' axes.
     """
     return bool(np.nanmax(np.abs(_positions(recording, points)[..., 1])) < _IN_PLANE)
+
+
+def orientation_doubts(walk: Recording, points: tuple[MarkerPoint, ...]) -> tuple[str, ...]:
+    """Return what contradicts a pass along +x of a person who faces it, a sentence each.
+
+    Args:
+        walk: A pass in the walking plane.
+        points: Where its markers sit.
+    """
+    places = np.nanmean(_positions(walk, points), axis=0)
+    doubts = []
+    front = [i for i, p in enumerate(points) if p.link == "pelvis" and p.position[0] > 0.0]
+    back = [i for i, p in enumerate(points) if p.link == "pelvis" and p.position[0] < 0.0]
+    if front and back and places[front, 0].mean() < places[back, 0].mean():
+        doubts.append(
+            "the pelvis faces away from where it goes: backwards, or its markers are exchanged"
+        )
+    right, left = (
+        [i for i, p in enumerate(points) if p.link.endswith(side)] for side in ("_r", "_l")
+    )
+    if right and left and places[left, 1].mean() < places[right, 1].mean() - _IN_PLANE:
+        doubts.append(
+            "left markers lie on the right: sides or axes of the laboratory are exchanged"
+        )
+    path = _pelvis_path(walk, points)
+    half = len(path) // 2
+    headings = [np.polyfit(np.arange(len(part)), part, 1)[0] for part in (path[:half], path[half:])]
+    bend = float(np.degrees(abs(np.subtract(*(np.arctan2(h[1], h[0]) for h in headings)))))
+    if _BEND < bend < 360.0 - _BEND and min(map(np.linalg.norm, headings)) * half > SHORTEST_WALK:
+        doubts.append(f"its path bends by {bend:.0f} degrees: angles are those in one plane")
+    return tuple(doubts)
 
 
 def _positions(recording: Recording, points: tuple[MarkerPoint, ...]) -> np.ndarray:

@@ -1,6 +1,6 @@
 """C3D recordings in: markers in metres, events, analog channels and force plates.
 
-Positions keep the axes of the laboratory; `inverse.markers` turns them into the walking plane.
+Positions keep the axes of the laboratory; `inverse.walk` turns them into the walking plane.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from pathwalker_cli.io.c3d_plates import METRES, ForcePlate, read_plates
 
 LEAST_FRAMES: Final = 20
 """Frames that the zero-lag filter needs at the ends, and fewer than any step has."""
+
+_FARTHEST: Final = 1e5
+"""Distance beyond which no laboratory reaches, even with mm taken for m [m]."""
 
 _LONGEST: Final = 60.0
 """Time to read a file [s]; a minute of walking takes less than a second."""
@@ -191,9 +194,10 @@ def _unit(parameters: Any, path: Path) -> float:
 
 
 def _positions(points: np.ndarray, unit: float) -> np.ndarray:
-    """Return positions [m], shape (n, m, 3); a point at exactly zero was not seen."""
+    """Return positions [m], shape (n, m, 3); a point at exactly zero or far away was not seen."""
     positions = np.moveaxis(points[:3], (0, 1, 2), (2, 1, 0)) * unit
-    missing = ~np.isfinite(positions).all(axis=2) | (positions == 0.0).all(axis=2)
+    seen = (np.abs(positions) < _FARTHEST).all(axis=2)  # NaN is not
+    missing = ~seen | (positions == 0.0).all(axis=2)
     positions[missing] = np.nan
     positions.setflags(write=False)
     return positions

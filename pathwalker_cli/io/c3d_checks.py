@@ -92,17 +92,6 @@ def check_markers(recording: Recording, names: Sequence[str], height: float, pat
     _check_signals(recording, path)
 
 
-def checked_recording(path: Path, markers: Sequence[str], height: float) -> Recording:
-    """Read a recording and check that these markers can be evaluated.
-
-    Raises:
-        DataError: See `readable_recording` and `check_markers`.
-    """
-    recording = readable_recording(path)
-    check_markers(recording, markers, height, path)
-    return recording
-
-
 def require_plates(recording: Recording) -> None:
     """Refuse a recording without force plates.
 
