@@ -210,13 +210,13 @@ def _load(*loads: tuple[np.ndarray, np.ndarray]) -> ForcePlate:
         ({}, "", ""),
         (
             {"part": 0.5},
-            "plate 1 also carries the left foot from frame 76",
-            "plate 1 carries part of the foot from frame 76",
+            "plate 1 also carries the left foot from frame 77",
+            "plate 1 carries part of the foot from frame 77",
         ),
         (
             {"part": 0.5, "standing_on": 0.0},
             "no plate below the foot",
-            "plate 1 carries part of the foot from frame 76",
+            "plate 1 carries part of the foot from frame 77",
         ),
     ],
 )

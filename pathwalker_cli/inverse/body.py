@@ -193,6 +193,9 @@ def _lengths(recording: Recording, known: KnownSet) -> dict[str, tuple[float, fl
         every["foot"].append(
             _apart(recording.marker(heel), toe) if heel else _apart(ankle, toe) / 0.78
         )
+    lost = [name for name, values in every.items() if not np.isfinite(values).all()]
+    if lost:
+        raise DataError(f"never shows both ends of the {lost[0]} at once", where=recording.name)
     return {name: (values[0], values[1]) for name, values in every.items()}
 
 

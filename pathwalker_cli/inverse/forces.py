@@ -135,6 +135,7 @@ def ground_forces(
         _carried(model, motion),
         {side: off_plate(foot, loads) for side, foot in prints.items()},
         {} if mend else {fault.plate: fault.what for fault in faults},
+        recording.first_frame,
     )
     judged = tuple(judge(stance, seen) for stance in stances(recording.events))
     table = _compose(recording, judged, [load.force[:, [0, 2]] for load in loads], points)

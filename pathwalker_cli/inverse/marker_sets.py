@@ -242,7 +242,22 @@ def _spine(patient: Patient) -> tuple[float, float]:
 def _pelvis_depth(known: KnownSet, recording: Recording) -> float:
     """Return the distance between front and back of the pelvis [m]."""
     apart = known.middle("asis", recording) - known.middle("psis", recording)
+    _require_seen(np.isfinite(apart[:, 0]), "both ends of the pelvis", recording)
     return float(np.nanmedian(np.linalg.norm(apart, axis=1)))
+
+
+def _require_seen(frames: np.ndarray, what: str, recording: Recording) -> None:
+    """Refuse a recording in which no frame shows what is measured.
+
+    Raises:
+        DataError: If so.
+    """
+    if not frames.any():
+        raise DataError(
+            f"shows {what} in no frame at once",
+            where=recording.name,
+            mend="label the markers, or say with --markers where they sit",
+        )
 
 
 def foot_places(
@@ -256,16 +271,18 @@ def foot_places(
     places: dict[tuple[Landmark, Side], np.ndarray] = {}
     ankles: dict[Side, float] = {}
     for side in SIDES:
-        labels = {n: known.markers[n, side] for n in _FEET if (n, side) in known.markers}
-        ankle = recording.marker(known.markers["ankle", side])[:, [0, 2]]
-        parts = {name: recording.marker(label)[:, [0, 2]] for name, label in labels.items()}
-        up = np.sum(
-            [part[:, 1] for part in (parts if "heel" in parts else parts | {"": ankle}).values()],
-            axis=0,
-        )
-        low = up <= np.nanquantile(up, _FLAT)
-        ankles[side] = float(np.nanmedian(ankle[low, 1]))
-        own = {name: np.nanmedian((part - ankle)[low], axis=0) for name, part in parts.items()}
+        labels = {
+            n: known.markers[n, side] for n in ("ankle", *_FEET) if (n, side) in known.markers
+        }
+        paths = {name: recording.marker(label)[:, [0, 2]] for name, label in labels.items()}
+        seen = np.isfinite(np.hstack([*paths.values()])).all(axis=1)
+        _require_seen(seen, f"all markers of the {side} foot", recording)
+        parts = {name: path[seen] for name, path in paths.items()}
+        ankle = parts.pop("ankle") if "heel" in parts else parts["ankle"]
+        up = np.sum([part[:, 1] for part in parts.values()], axis=0)
+        low = up <= np.quantile(up, _FLAT)
+        ankles[side] = float(np.median(ankle[low, 1]))
+        own = {n: np.median((p - ankle)[low], axis=0) for n, p in parts.items() if n != "ankle"}
         if "heel" in own:
             line = own["toe"] - own["heel"]
             slope = float(np.arctan2(line[1], line[0]))

@@ -82,6 +82,7 @@ class Evidence:
         carried: Vertical force that the motion of the centre of mass takes [N], shape (n,).
         off: Per side, distance of the foot from every plate [m], 0 if unknown, shape (n, plates).
         faults: What is wrong with plates that cannot be used, by their index.
+        first: Number that the recording program gives the first frame.
     """
 
     events: tuple[Event, ...]
@@ -91,6 +92,7 @@ class Evidence:
     carried: np.ndarray
     off: Mapping[Side, np.ndarray]
     faults: Mapping[int, str]
+    first: int
 
 
 def judge(stance: Stance, seen: Evidence) -> StanceForce:
@@ -117,10 +119,10 @@ def _doubts(stance: Stance, plate: int, seen: Evidence) -> Iterator[str]:
     strikes = [e.frame for e in seen.events if (e.side, e.kind) == (other, "foot_strike")]
     for strike in strikes:
         if stance.strike < strike <= stance.toe_off and _struck(plate, strike, other, seen):
-            yield f"{name} also carries the {other} foot from frame {strike}"
+            yield f"{name} also carries the {other} foot from frame {seen.first + strike}"
     for index in range(seen.up.shape[1]):
         if index != plate and _struck(index, stance.strike, stance.side, seen):
-            yield f"plate {index + 1} carries part of the foot from frame {stance.strike}"
+            yield f"plate {index + 1} carries part of the foot from frame {seen.first + stance.strike}"
     foot = seen.feet[stance.side]
     gap = outside(seen.points[stance.rows, plate], foot.ends[stance.rows])
     if not np.mean(gap[np.isfinite(gap)] < MARGIN * foot.length) >= INSIDE:
