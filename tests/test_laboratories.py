@@ -141,6 +141,17 @@ def test_a_name_that_stands_twice_is_refused(tmp_path: Path) -> None:
         evaluated(tmp_path / "walk.c3d")
 
 
+def test_labels_beyond_the_255th_are_read(good: Trial, tmp_path: Path) -> None:
+    """C3D goes on with them in LABELS2."""
+    others = np.ones((len(walk().positions), 260, 3))
+    positions = np.concatenate([others, walk().positions], axis=1)
+    names = (*[f"*{number}" for number in range(260)], *walk().markers)
+    write_c3d(tmp_path / "walk.c3d", replace(walk(), markers=names, positions=positions))
+    assert "LABELS2" in ezc3d.c3d(str(tmp_path / "walk.c3d"))["parameters"]["POINT"]
+    (trial,) = evaluated(tmp_path / "walk.c3d")
+    assert angles(trial) == pytest.approx(angles(good), abs=1e-9)
+
+
 def test_one_of_two_subjects_is_chosen_by_name(good: Trial, tmp_path: Path) -> None:
     every = walk().markers
     names = (*[f"Anna:{n}" for n in every], *[f"Bob:{n}" for n in every])

@@ -122,7 +122,8 @@ def _doubts(stance: Stance, plate: int, seen: Evidence) -> Iterator[str]:
             yield f"{name} also carries the {other} foot from frame {seen.first + strike}"
     for index in range(seen.up.shape[1]):
         if index != plate and _struck(index, stance.strike, stance.side, seen):
-            yield f"plate {index + 1} carries part of the foot from frame {seen.first + stance.strike}"
+            frame = seen.first + stance.strike
+            yield f"plate {index + 1} carries part of the foot from frame {frame}"
     foot = seen.feet[stance.side]
     gap = outside(seen.points[stance.rows, plate], foot.ends[stance.rows])
     if not np.mean(gap[np.isfinite(gap)] < MARGIN * foot.length) >= INSIDE:
