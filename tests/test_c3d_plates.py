@@ -122,7 +122,7 @@ def test_moments_in_their_own_unit(tmp_path: Path) -> None:
         (6, {}, "it is of type 6; allowed: types 1, 2, 3, 4, 5, 7"),
         (7, {}, "it has no CAL_MATRIX of 8 x 8"),
         (2, {"CHANNEL": np.array([[1], [2], [3], [4], [5], [60]])}, "names channels that are not"),
-        (2, {"CORNERS": np.zeros((3, 4, 0))}, "lacks channels, corners, origin or calibration"),
+        (2, {"CORNERS": np.zeros((3, 4, 0))}, "lacks channels, corners or origin"),
     ],
 )
 def test_a_plate_that_cannot_be_read_is_left_out(

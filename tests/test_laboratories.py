@@ -17,7 +17,7 @@ import pytest
 from click.testing import CliRunner
 
 from pathwalker_cli.cli import cli
-from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.conventions import SIDES, Condition
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.body import measured_body
 from pathwalker_cli.inverse.c3d_trials import c3d_trials
@@ -29,11 +29,13 @@ from pathwalker_cli.inverse.trials import kinematics_trials
 from pathwalker_cli.inverse.walk import about_vertical, cut, turned
 from pathwalker_cli.io.c3d import Recording, read_c3d
 from pathwalker_cli.io.c3d_write import write_c3d
+from pathwalker_cli.io.recordings import read_recording
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.starter.example import made_recordings
 
 ezc3d = pytest.importorskip("ezc3d")
 
+RECORDINGS = Path(__file__).parents[2] / "shared" / "recordings"
 CASES = Path(__file__).parents[2] / "shared" / "cases"
 needs_cases = pytest.mark.skipif(
     not CASES.is_dir(), reason="needs shared/cases beside the checkout"
@@ -434,6 +436,23 @@ def test_plates_weigh_who_stands_on_them(tmp_path: Path) -> None:
 
 
 # --- files of real laboratories -------------------------------------------------------------------
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="needs shared/recordings beside the checkout")
+@pytest.mark.parametrize(("condition", "measured"), [("barefoot", 9), ("orthosis", 13)])
+def test_the_shipped_trials_stay_what_they_were(condition: Condition, measured: int) -> None:
+    """Angles to the digits of the shipped tables, and as many measured stances."""
+    patient, count = load_patient(SHIPPED), 0
+    for path in sorted((RECORDINGS / condition).glob("*.c3d")):
+        config = RecordedConfig(patient=SHIPPED)
+        ((trial, _),) = c3d_trials(path, patient, condition, config)
+        shipped = read_recording(patient, condition, path.stem)
+        assert np.abs(angles(trial) - shipped.motion.values[:, 1:]).max() < 1.7e-6  # 1e-4 degrees
+        assert trial.events == shipped.events
+        assert trial.remarks == trial.doubts == ()
+        count += sum(item.measured for item in trial.stances)
+    assert count == measured
+
 
 REAL: dict[str, tuple[str, str | None, str, int]] = {
     # file: patient, marker set, words that are said, measured stances

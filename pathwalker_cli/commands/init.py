@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     metavar="C3D",
     help="Measure the child in a recorded pose or walk; C3D... are its barefoot walks.",
 )
+@click.option("--subject", metavar="NAME", help="Whose markers, if that file names several.")
 @click.option("--without-orthosis", is_flag=True, help="Of a child that only walks barefoot.")
 @click.option("--example", is_flag=True, help="Also make C3D recordings of the child, to try all.")
 def init_command(
@@ -37,6 +38,7 @@ def init_command(
     height: float | None,
     sex: str | None,
     source: Path | None,
+    subject: str | None,
     without_orthosis: bool,
     example: bool,
 ) -> None:
@@ -51,7 +53,9 @@ def init_command(
     """
     from pathwalker_cli.starter.files import command_lines, next_steps, write_folder
 
-    child = _child(name or _safe(folder.resolve().name), age, mass, height, sex, source, walks)
+    child = _child(
+        name or _safe(folder.resolve().name), age, mass, height, sex, source, subject, walks
+    )
     with_orthosis = not without_orthosis
     write_folder(folder, child, with_orthosis, example, walks)
     kind = "a child" if source else "a made-up child"
@@ -76,6 +80,7 @@ def _child(
     height: float | None,
     sex: str | None,
     source: Path | None,
+    subject: str | None,
     walks: tuple[Path, ...],
 ) -> Child:
     """Return a made-up child, or that of a recording."""
@@ -97,7 +102,7 @@ def _child(
             "no recording tells a child's age and sex", where="--from", mend="add --age and --sex"
         )
     c3d_files([source, *walks])
-    body = measured_body(source, mass, height)
+    body = measured_body(source, mass, height, subject)
     for what, value in (("--mass", body.mass), ("--height", body.height)):
         if value is None:
             raise DataError("is not in the file", where=what, mend=f"add {what}")

@@ -15,6 +15,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.c3d_events import continued
+
 METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Length of the units of C3D files [m]."""
 
@@ -75,20 +78,12 @@ def read_plates(content: Any, unit: float) -> tuple[tuple[ForcePlate, ...], tupl
         kinds = np.atleast_1d(group["TYPE"]["value"])
         kind = int(kinds[index]) if index < kinds.size else 0
         try:
-            if kind not in _CHANNELS:
-                known = ", ".join(map(str, _CHANNELS))
-                raise LookupError(f"is of type {kind}; allowed: types {known}")
             plates.append(_plate(name, kind, _parameters(group, index), analog, content, unit))
-        except (LookupError, ValueError) as problem:
-            remarks.append(f"{name} is left out: it {_reason(problem)}")
+        except DataError as problem:
+            remarks.append(f"{name} is left out: it {problem}")
+        except (LookupError, ValueError):
+            remarks.append(f"{name} is left out: it lacks channels, corners or origin")
     return tuple(plates), tuple(remarks)
-
-
-def _reason(problem: Exception) -> str:
-    """Return what is wrong with a plate in words."""
-    text = str(problem.args[0]) if problem.args else ""
-    ours = text.startswith(("is of", "names", "has no"))
-    return text if ours else "lacks channels, corners, origin or calibration"
 
 
 def _parameters(group: Mapping[str, Any], index: int) -> dict[str, np.ndarray]:
@@ -112,14 +107,17 @@ def _plate(
     unit: float,
 ) -> ForcePlate:
     """Return one plate from its parameters and all analog channels, shape (samples, channels)."""
+    if kind not in _CHANNELS:
+        allowed = f"types {', '.join(map(str, _CHANNELS))}"
+        raise DataError(f"is of type {kind}", allowed=allowed)
     columns = values["CHANNEL"][: _CHANNELS[kind]].astype(int) - 1
     if columns.size < _CHANNELS[kind] or columns.min() < 0 or columns.max() >= analog.shape[1]:
-        raise LookupError(f"names channels that are not there; type {kind} has {_CHANNELS[kind]}")
+        raise DataError(f"names channels that are not there, and type {kind} has {_CHANNELS[kind]}")
     channels = analog[:, columns]
     if kind in _CALIBRATED:
         rows, count = _CALIBRATED[kind]
         if "CAL_MATRIX" not in values or min(values["CAL_MATRIX"].shape) < min(rows, count):
-            raise LookupError(f"has no CAL_MATRIX of {rows} x {count}")
+            raise DataError(f"has no CAL_MATRIX of {rows} x {count}")
         channels = channels @ values["CAL_MATRIX"][:rows, :count].T
     # in files of some programs the sensors seem to lie above the surface
     origin = values["ORIGIN"] * unit
@@ -161,7 +159,7 @@ def _wrench_of_eight(channels: np.ndarray, a: float, b: float) -> np.ndarray:
 def _moment_unit(content: Any, columns: np.ndarray, unit: float, calibrated: bool) -> float:
     """Return the length in the unit of the moments [m]: their own, else the file's."""
     group = content["parameters"]["ANALOG"]
-    units = [str(text) for text in group["UNITS"]["value"]] if "UNITS" in group else []
+    units = [str(text) for text in continued(group, "UNITS")]
     if not calibrated and columns[-1] < len(units):
         own = units[columns[-1]].lower().strip().removeprefix("n").strip(" .*-")
         return METRES.get(own, unit)
@@ -188,8 +186,9 @@ def _analog(content: Any) -> np.ndarray:
     group = content["parameters"]["ANALOG"]
     channels = np.array(content["data"]["analogs"][0].T, dtype=float)
     used = channels.shape[1]
-    offset = np.asarray(group["OFFSET"]["value"], dtype=float)[:used]
-    scale = np.asarray(group["SCALE"]["value"], dtype=float)[:used]
+    offset, scale = (
+        np.asarray(continued(group, name), dtype=float)[:used] for name in ("OFFSET", "SCALE")
+    )
     general = float(group["GEN_SCALE"]["value"][0])
     form = group["FORMAT"]["value"] if "FORMAT" in group else []
     unsigned = bool(form) and str(form[0]).strip().upper() == "UNSIGNED"
