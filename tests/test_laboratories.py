@@ -447,7 +447,8 @@ def test_the_shipped_trials_stay_what_they_were(condition: Condition, measured: 
         config = RecordedConfig(patient=SHIPPED)
         ((trial, _),) = c3d_trials(path, patient, condition, config)
         shipped = read_recording(patient, condition, path.stem)
-        assert np.abs(angles(trial) - shipped.motion.values[:, 1:]).max() < 1.7e-6  # 1e-4 degrees
+        expected = shipped.motion.values[:, 1:]  # with six digits
+        assert angles(trial) == pytest.approx(expected, rel=5.1e-6, abs=1e-6)
         assert trial.events == shipped.events
         assert trial.remarks == trial.doubts == ()
         count += sum(item.measured for item in trial.stances)
