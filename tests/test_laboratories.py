@@ -340,6 +340,11 @@ RENAMED: dict[str, dict[str, str]] = {
         "LANK": "L.Ankle", "RANK": "R.Ankle", "LTOE": "L.Toe", "RTOE": "R.Toe", "LHEE": "L.Heel",
         "RHEE": "R.Heel", "CLAV": "X",
     },
+    "Davis": {
+        "LASI": "l asis", "RASI": "r asis", "SACR": "sacrum", "LKNE": "l knee 1",
+        "RKNE": "r knee 1", "LANK": "l mall", "RANK": "r mall", "LTOE": "l met", "RTOE": "r met",
+        "LHEE": "l heel", "RHEE": "r heel", "C7": "c7", "CLAV": "x",
+    },
     "CAST": {
         "LASI": "L_IAS", "RASI": "R_IAS", "SACR": "L_IPS", "SACR2": "R_IPS", "LKNE": "L_FLE",
         "RKNE": "R_FLE", "LANK": "L_FAL", "RANK": "R_FAL", "LTOE": "L_FM2", "RTOE": "R_FM2",
@@ -398,6 +403,8 @@ def test_a_folder_from_a_recording(tmp_path: Path) -> None:
     """Lengths of the made walk are those of the shipped patient, hips 4 cm further ahead."""
     path = edited(tmp_path / "static.c3d", with_numbers, relabelled({}))
     words = ["init", str(tmp_path / "new"), str(path), "--from", str(path), "--sex", "male"]
+    unmeasured = CliRunner().invoke(cli, ["init", str(tmp_path / "new"), str(path)])
+    assert "is given without --from" in unmeasured.output
     refused = CliRunner().invoke(cli, words)
     assert "no recording tells a child's age and sex" in refused.output
     result = CliRunner().invoke(cli, [*words, "--age", "6"])

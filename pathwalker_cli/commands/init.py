@@ -51,11 +51,24 @@ def init_command(
     With --from, body mass, height, lengths and feet are those of a recording with a marker set that
     is recognised, and the file says where each number comes from; walks are copied to c3d/barefoot.
     """
+    from pathwalker_cli.errors import DataError
+    from pathwalker_cli.io.c3d_checks import c3d_files
+    from pathwalker_cli.starter.child import made_child
     from pathwalker_cli.starter.files import command_lines, next_steps, write_folder
 
-    child = _child(
-        name or _safe(folder.resolve().name), age, mass, height, sex, source, subject, walks
-    )
+    id_ = name or _safe(folder.resolve().name)
+    if source:
+        if example:
+            raise DataError(
+                "makes up what --from measures", where="--example", mend="leave one out"
+            )
+        child = _measured_child(id_, age, sex, mass, height, source, subject)
+    elif walks:
+        mend = "add --from with a pose or a walk of the child"
+        raise DataError("is given without --from", where=str(walks[0]), mend=mend)
+    else:
+        child = made_child(id_, age, mass, height, **({"sex": sex} if sex else {}))
+    walks = c3d_files(walks)
     with_orthosis = not without_orthosis
     write_folder(folder, child, with_orthosis, example, walks)
     kind = "a child" if source else "a made-up child"
@@ -73,42 +86,31 @@ def init_command(
             click.echo(command_lines(command, 2))
 
 
-def _child(
+def _measured_child(
     name: str,
     age: float | None,
+    sex: str | None,
     mass: float | None,
     height: float | None,
-    sex: str | None,
-    source: Path | None,
+    source: Path,
     subject: str | None,
-    walks: tuple[Path, ...],
 ) -> Child:
-    """Return a made-up child, or that of a recording."""
+    """Return the child of a recording; what is given counts before what it tells."""
     from pathwalker_cli.errors import DataError
     from pathwalker_cli.inverse.body import measured_body
-    from pathwalker_cli.io.c3d_checks import c3d_files
     from pathwalker_cli.starter.child import made_child
 
-    if source is None:
-        if walks:
-            raise DataError(
-                "is given without --from",
-                where=str(walks[0]),
-                mend="add --from with a pose or walk",
-            )
-        return made_child(name, age, mass, height, **({"sex": sex} if sex else {}))
     if age is None or sex is None:
         raise DataError(
             "no recording tells a child's age and sex", where="--from", mend="add --age and --sex"
         )
-    c3d_files([source, *walks])
     body = measured_body(source, mass, height, subject)
     for what, value in (("--mass", body.mass), ("--height", body.height)):
         if value is None:
             raise DataError("is not in the file", where=what, mend=f"add {what}")
-    given = ("age, sex: as given", *body.sources)
+    sources = ("age, sex: as given", *body.sources)
     return made_child(name, age, body.mass, body.height, sex=sex, lengths=body.lengths,
-                      soles=body.soles, sources=given)  # fmt: skip
+                      soles=body.soles, sources=sources)  # fmt: skip
 
 
 def _safe(name: str) -> str:

@@ -49,8 +49,12 @@ _LANDMARKS: Final[Mapping[str, Mapping[Landmark, tuple[str, ...]]]] = {
     },
     "Helen Hayes": {
         "asis": ("{}.ASIS", "{}ASIS"), "psis": ("V.Sacral", "Sacral", "SACRAL"),
-        "knee": ("{}.Knee", "{}.Knee.Lateral"), "ankle": ("{}.Ankle", "{}.Ankle.Lateral"),
-        "toe": ("{}.Toe",), "heel": ("{}.Heel",), "c7": ("C7",), "clavicle": ("CLAV",),
+        "knee": ("{}.Knee", "{}.Knee.Lat"), "ankle": ("{}.Ankle", "{}.Ankle.Lat"),
+        "toe": ("{}.Toe", "{}.Toe.Tip"), "heel": ("{}.Heel",), "c7": ("C7",), "clavicle": (),
+    },
+    "Davis": {
+        "asis": ("{} asis",), "psis": ("sacrum",), "knee": ("{} knee 1",), "ankle": ("{} mall",),
+        "toe": ("{} met",), "heel": ("{} heel",), "c7": ("c7",), "clavicle": (),
     },
     "CAST": {
         "asis": ("{}_IAS", "{}IAS"), "psis": ("{}_IPS", "{}IPS"),
