@@ -228,6 +228,11 @@ def test_a_pose_is_set_aside_or_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(DataError, match=r"static: LASI, SACR travel 0.00 m"):
         kinematics_trials(config, load_patient(SHIPPED), lambda _: None)
+    rolling = walk().positions.copy()
+    rolling[..., 0] -= np.linspace(rolling[0, 0, 0], rolling[-1, 0, 0], len(rolling))[:, None]
+    write_c3d(tmp_path / "treadmill.c3d", replace(walk(), positions=rolling, plates=()))
+    with pytest.raises(DataError, match="walks on a treadmill cannot be read"):
+        evaluated(tmp_path / "treadmill.c3d")
     write_c3d(tmp_path / "c3d" / "walk.c3d", walk())
     (trial,) = kinematics_trials(config, load_patient(SHIPPED), lambda _: None)
     assert "static is set aside: its LASI, SACR travel 0.00 m" in said(trial)

@@ -59,6 +59,7 @@ def walks(recording: Recording, points: tuple[MarkerPoint, ...]) -> tuple[Record
             f"{', '.join(dict.fromkeys(_on(points, 'pelvis')))} travel {travel:.2f} m",
             where=recording.name,
             allowed=f"at least {SHORTEST_WALK} m, so that the walking direction is certain",
+            mend="walks on a treadmill cannot be read" if _swings(recording, points) else "",
         )
     if len(runs) == 1:
         return (turned(recording, _heading(path)),)
@@ -213,6 +214,13 @@ def upright(recording: Recording, points: tuple[MarkerPoint, ...]) -> Recording:
     remark = f"its vertical is {name}: turned so that z points up"
     upright = turned(recording, np.stack([ahead, np.cross(up, ahead), up]))
     return replace(upright, remarks=(*recording.remarks, remark))
+
+
+def _swings(recording: Recording, points: tuple[MarkerPoint, ...]) -> bool:
+    """Return whether a foot goes to and fro, however little the pelvis travels."""
+    foot = recording.marker(_on(points, "foot_r")[0])[:, :2]
+    seen = foot[np.isfinite(foot[:, 0])]
+    return bool(seen.size and np.ptp(seen, axis=0).max() > SHORTEST_WALK)
 
 
 def _pelvis_path(recording: Recording, points: tuple[MarkerPoint, ...]) -> np.ndarray:
