@@ -10,7 +10,10 @@ import numpy as np
 from pathwalker_cli.inverse.kinematics import marker_paths
 from pathwalker_cli.inverse.markers import load_marker_set, marker_points
 from pathwalker_cli.io import c3d_write
-from pathwalker_cli.io.c3d import METRES, Event, ForcePlate, Recording
+from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.io.c3d_checks import check_markers, readable_recording
+from pathwalker_cli.io.c3d_events import Event
+from pathwalker_cli.io.c3d_plates import METRES, ForcePlate
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import load_patient
 
@@ -65,14 +68,21 @@ def write_c3d(
     return path
 
 
+def checked(path: Path, markers: tuple[str, ...], height: float) -> Recording:
+    """Read a recording and check that these markers can be evaluated."""
+    recording = readable_recording(path)
+    check_markers(recording, markers, height, path)
+    return recording
+
+
 def _plate(frames: int, nan_channel: bool, flat: bool) -> ForcePlate:
     """Return a long plate that both feet load from frame 15 to 110."""
-    channels = np.zeros((frames * PER_FRAME, 8))
-    channels[15 * PER_FRAME : 110 * PER_FRAME, 4:] = 60.0
+    force = np.zeros((frames * PER_FRAME, 3))
+    force[15 * PER_FRAME : 110 * PER_FRAME, 2] = 240.0
     if nan_channel:
-        channels[40, 6] = np.nan
+        force[40, 2] = np.nan
     corners = np.array([[2.0, 0.3, 0], [-1.0, 0.3, 0], [-1.0, -0.3, 0], [2.0, -0.3, 0]])
-    return ForcePlate("plate 1", corners * (not flat), 1.4, 0.275, 0.027, channels)
+    return ForcePlate("plate 1", corners * (not flat), force, np.zeros_like(force))
 
 
 def cut(path: Path) -> Path:

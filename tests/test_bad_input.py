@@ -19,7 +19,7 @@ from click.testing import CliRunner
 
 from broken import ANGLES, ARCHIVES, EVENTS, HTML, JSON, TABLES, YAML, angles, bomb
 from helpers import called_apart
-from made_c3d import write_c3d
+from made_c3d import checked, write_c3d
 from pathwalker_cli.checking.kinds import KINDS, check_orthosis
 from pathwalker_cli.cli import REFUSED, cli
 from pathwalker_cli.config import load_config
@@ -27,7 +27,6 @@ from pathwalker_cli.errors import InputError
 from pathwalker_cli.inverse.markers import load_marker_set
 from pathwalker_cli.inverse.study import load_inverse_dynamics, load_inverse_kinematics
 from pathwalker_cli.io import c3d
-from pathwalker_cli.io.c3d_checks import checked_recording
 from pathwalker_cli.io.recordings import read_compact
 from pathwalker_cli.io.yaml_file import read_mapping, yaml_text
 from pathwalker_cli.paths import shipped
@@ -251,7 +250,7 @@ C3D: Final[dict[str, Callable[[bytes], bytes]]] = {
     "65535 analog samples": lambda data: data[:4] + b"\xff\xff" + data[6:],
     "65534 frames": lambda data: data[:8] + struct.pack("<H", 65534) + data[10:],
     "data elsewhere": lambda data: data[:16] + b"\xff\xff" + data[18:],
-    "no scale": renamed(b"SCALE&", b"LCALE&"),
+    "no scale": renamed(b"SCALE\x1e", b"LCALE\x1e"),
     "no offset": renamed(b"OFFSET", b"OFFSEX"),
     "no labels": renamed(b"LABELS", b"LABELX"),
     "no units": renamed(b"UNITS", b"UNITX"),
@@ -271,7 +270,7 @@ def test_broken_c3d_files_are_refused_and_kill_nobody(
     monkeypatch.setattr(c3d, "_LONGEST", 2.0)
     path = write_c3d(tmp_path / "walk.c3d", plate=True)
     path.write_bytes(C3D[fault](path.read_bytes()))
-    assert "walk" in sentence(lambda: checked_recording(path, ("LASI", "RTOE"), 1.0))
+    assert "walk" in sentence(lambda: checked(path, ("LASI", "RTOE"), 1.0))
 
 
 def limited() -> None:

@@ -16,7 +16,7 @@ from pathwalker_cli.inverse.cycles import (
     swings,
     walking_speed,
 )
-from pathwalker_cli.io.c3d import Event
+from pathwalker_cli.io.c3d_events import Event
 from pathwalker_cli.trajectory import Trajectory
 
 EVENTS = (

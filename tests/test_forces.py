@@ -10,57 +10,50 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pathwalker_cli.conventions import COORDINATES, GRAVITY
+from pathwalker_cli.conventions import COORDINATES, GRAVITY, Side
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.dynamics import low_pass, smooth_rates
 from pathwalker_cli.inverse.forces import (
     centre_of_pressure,
     foot_extents,
     ground_forces,
-    plate_load,
 )
-from pathwalker_cli.inverse.markers import WalkingPlane
 from pathwalker_cli.inverse.published import wrench_axis_at_ground
 from pathwalker_cli.inverse.study import RecordedConfig
-from pathwalker_cli.inverse.trials import c3d_trial
-from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
+from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.io.c3d_events import Event
+from pathwalker_cli.io.c3d_plates import ForcePlate, plate_axes
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.trajectory import Trajectory
 
 RECORDINGS = Path(__file__).parents[2] / "shared" / "recordings"
-A, B, DEPTH = 0.175, 0.275, 0.027
+DEPTH = 0.027
 CORNERS = np.array([[0.2, 0.3, 0.0], [-0.2, 0.3, 0.0], [-0.2, -0.3, 0.0], [0.2, -0.3, 0.0]])
 FRAMES, PER_FRAME = 120, 9
-
-
-def channels(force: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Return the eight channels of a plate at the origin under a force at a surface point.
-
-    Args:
-        force: Force on the body in the plate's axes [N], shape (n, 3).
-        point: Point (x, y) on the surface [m], shape (n, 2).
-    """
-    fx, fy, fz = force.T
-    mx = fz * point[:, 1] + DEPTH * fy
-    my = -fz * point[:, 0] - DEPTH * fx
-    mz = fy * point[:, 0] - fx * point[:, 1]
-    s, d = mx / B, my / A
-    z = [(fz + s - d) / 4, (fz + s + d) / 4, (fz - s + d) / 4, (fz - s - d) / 4]
-    twist = mz / (2 * A)
-    return np.stack([fx / 2, fx / 2, fy / 2 + twist, fy / 2 - twist, *z], axis=1)
+ASIDE: dict[Side, np.ndarray] = {"right": np.zeros(FRAMES), "left": np.zeros(FRAMES)}
 
 
 def plate(force: np.ndarray, point: np.ndarray, corners: np.ndarray = CORNERS) -> ForcePlate:
-    """Return a made plate under a load given in its own axes."""
-    return ForcePlate("made", corners, A, B, DEPTH, channels(force, point))
+    """Return a made plate under a load given in its own axes.
+
+    Args:
+        force: Force on the body [N], shape (n, 3).
+        point: Point (x, y) on the surface where it acts [m], shape (n, 2).
+        corners: The plate's corners [m].
+    """
+    axes = plate_axes(corners)
+    moment = np.cross(np.column_stack([point, np.zeros(len(point))]), force)
+    depth = np.array([0.0, 0.0, -DEPTH]) @ axes
+    return ForcePlate("made", corners, force @ axes, moment @ axes, depth)
 
 
 def test_load_and_centre_of_pressure_are_found() -> None:
     rng = np.random.default_rng(2)
     force = np.column_stack([rng.normal(size=(20, 2)) * 30.0, rng.uniform(100, 300, 20)])
     point = rng.uniform(-0.1, 0.1, size=(20, 2))
-    load = plate_load(plate(force, point))
+    load = plate(force, point)
     assert load.force == pytest.approx(force)
     assert centre_of_pressure(load, 20.0)[:, :2] == pytest.approx(point, abs=1e-12)
 
@@ -69,7 +62,7 @@ def test_axes_of_a_turned_plate() -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     moved = CORNERS @ turn.T + np.array([1.0, 2.0, 0.0])
     force, point = np.array([[10.0, 20.0, 200.0]]), np.array([[0.05, -0.1]])
-    load = plate_load(plate(force, point, moved))
+    load = plate(force, point, moved)
     assert load.force[0] == pytest.approx(turn @ force[0])
     expected = turn @ np.array([0.05, -0.1, 0.0]) + np.array([1.0, 2.0, 0.0])
     assert centre_of_pressure(load, 20.0)[0] == pytest.approx(expected)
@@ -77,12 +70,12 @@ def test_axes_of_a_turned_plate() -> None:
 
 def test_published_centre_ignores_the_depth() -> None:
     force, point = np.array([[40.0, 0.0, 200.0]]), np.array([[0.05, 0.0]])
-    published = wrench_axis_at_ground(plate_load(plate(force, point)))[0, 0]
+    published = wrench_axis_at_ground(plate(force, point))[0, 0]
     assert published - 0.05 == pytest.approx(DEPTH * 0.2 + 0.05 * (1 / 1.04 - 1), abs=1e-3)
 
 
 def test_unloaded_plate_has_no_centre() -> None:
-    load = plate_load(plate(np.array([[0.0, 0.0, 5.0]]), np.zeros((1, 2))))
+    load = plate(np.array([[0.0, 0.0, 5.0]]), np.zeros((1, 2)))
     assert np.isnan(centre_of_pressure(load, 20.0)).all()
 
 
@@ -135,7 +128,7 @@ def recording(share: float = 1.0, shift: float = 0.0, late: int = 0) -> Recordin
     )
     blank = np.zeros((FRAMES, 0, 3))
     loaded_plate = plate(force, point)
-    noisy = replace(loaded_plate, channels=loaded_plate.channels + 1.5)
+    noisy = replace(loaded_plate, force=loaded_plate.force + 1.5, moment=loaded_plate.moment + 0.4)
     return Recording("made", 120.0, (), blank, events, (noisy,), PER_FRAME)
 
 
@@ -143,7 +136,7 @@ def test_force_of_a_clean_stance() -> None:
     model, motion, heel = standing()
     forces = ground_forces(recording(), model, motion)
     assert [item.reason for item in forces.stances] == [""]
-    assert forces.plane.name == "+x"
+    assert forces.direction == "+x"
     weight = GRAVITY * pin.computeTotalMass(model)
     right, left = (forces.table.select((f"force_{s}_x", f"force_{s}_z")).values for s in ("r", "l"))
     assert right[40:80, 1] == pytest.approx(weight, rel=0.01)
@@ -166,8 +159,7 @@ def test_force_of_a_clean_stance() -> None:
 )
 def test_doubtful_stances_are_not_measured(made: dict[str, float], reason: str) -> None:
     model, motion, _ = standing()
-    ahead = WalkingPlane(axis=0, sign=1)
-    forces = ground_forces(recording(**made), model, motion, ahead)  # type: ignore[arg-type]
+    forces = ground_forces(recording(**made), model, motion, ASIDE)  # type: ignore[arg-type]
     assert reason in forces.stances[0].reason
     assert np.isnan(forces.table.select(("force_r_x", "force_r_z")).values[40:80]).all()
 
@@ -188,8 +180,8 @@ def two_steps(part: float = 0.0, standing_on: float = 1.0) -> Recording:
     left = weight * (np.interp(frame, [76, 90], [0.0, 1.0]) * (frame < 115))
     onto = part * left * ((frame >= 76) & (frame < 86))
     under_right, under_left = np.array([heel + 0.1, 0.0]), np.array([heel + 0.05, 0.0])
-    first = _load(standing_on * right, under_right) + _load(onto, under_left + shift[:2])
-    second = _load(left - onto, under_left)
+    first = _load((standing_on * right, under_right), (onto, under_left + shift[:2]))
+    second = _load((left - onto, under_left))
     events = (
         Event("right", "foot_strike", 30),
         Event("left", "toe_off", 32),
@@ -199,15 +191,17 @@ def two_steps(part: float = 0.0, standing_on: float = 1.0) -> Recording:
         Event("left", "toe_off", 115),
     )
     plates = (
-        ForcePlate("plate 1", CORNERS, A, B, DEPTH, first),
-        ForcePlate("plate 2", CORNERS + shift, A, B, DEPTH, second),
+        replace(first, name="plate 1", corners=CORNERS * [4.0, 1.0, 1.0]),
+        replace(second, name="plate 2", corners=CORNERS + shift),
     )
     return Recording("made", 120.0, (), np.zeros((FRAMES, 0, 3)), events, plates, PER_FRAME)
 
 
-def _load(up: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Return the channels of a plate under a vertical force at one of its points."""
-    return channels(np.outer(up, [0.0, 0.0, 1.0]), np.tile(point, (up.size, 1)))
+def _load(*loads: tuple[np.ndarray, np.ndarray]) -> ForcePlate:
+    """Return a plate under vertical forces (n,) [N], each at one of its points [m]."""
+    made = [plate(np.outer(up, [0.0, 0.0, 1.0]), np.tile(at, (up.size, 1))) for up, at in loads]
+    force, moment = sum(p.force for p in made), sum(p.moment for p in made)
+    return replace(made[0], force=np.asarray(force), moment=np.asarray(moment))
 
 
 @pytest.mark.parametrize(
@@ -216,19 +210,19 @@ def _load(up: np.ndarray, point: np.ndarray) -> np.ndarray:
         ({}, "", ""),
         (
             {"part": 0.5},
-            "plate 1 also carries the left foot from frame 76",
-            "plate 1 carries part of the foot from frame 76",
+            "plate 1 also carries the left foot from frame 77",
+            "plate 1 carries part of the foot from frame 77",
         ),
         (
             {"part": 0.5, "standing_on": 0.0},
             "no plate below the foot",
-            "plate 1 carries part of the foot from frame 76",
+            "plate 1 carries part of the foot from frame 77",
         ),
     ],
 )
 def test_a_foot_on_two_plates_spoils_both(made: dict[str, float], right: str, left: str) -> None:
     model, motion, _ = standing()
-    forces = ground_forces(two_steps(**made), model, motion, WalkingPlane(axis=0, sign=1))
+    forces = ground_forces(two_steps(**made), model, motion, ASIDE)
     assert [(item.stance.side, item.reason) for item in forces.stances] == [
         ("right", right),
         ("left", left),
@@ -269,9 +263,9 @@ def test_recorded_stances(trial: str, direction: str, measured: str) -> None:
     patient = load_patient("sreenivasa2017-patient")
     condition = "orthosis" if trial.startswith("orthosis") else "barefoot"
     config = RecordedConfig(patient=patient.id)
-    walk, read = c3d_trial(RECORDINGS / f"{trial}.c3d", patient, condition, config)
+    ((walk, read),) = c3d_trials(RECORDINGS / f"{trial}.c3d", patient, condition, config)
     forces = ground_forces(read, pinocchio_model(patient, condition), walk.motion)
-    assert forces.plane.name == direction
+    assert forces.direction == direction
     assert forces.stances == walk.stances
     found = [item for item in walk.stances if item.measured]
     assert "".join(item.stance.side[0] for item in found) == measured

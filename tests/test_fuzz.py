@@ -13,6 +13,7 @@ import random
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
@@ -25,12 +26,15 @@ from hypothesis import strategies as st
 
 from broken import angles, arrays
 from helpers import stylised_series
-from made_c3d import write_c3d
+from made_c3d import checked, write_c3d
 from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import DataError, InputError
+from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.markers import load_marker_set
+from pathwalker_cli.inverse.study import RecordedConfig
+from pathwalker_cli.inverse.text import trial_notes
 from pathwalker_cli.io import c3d
-from pathwalker_cli.io.c3d_checks import checked_recording
+from pathwalker_cli.io.c3d_write import write_c3d as write_recording
 from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.io.opensim import read_opensim
 from pathwalker_cli.io.recordings import read_compact
@@ -245,7 +249,64 @@ def test_c3d_files_with_some_bytes_changed(seed: int) -> None:
         del data[rng.randrange(len(data)) :]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(c3d, "_LONGEST", 2.0)
-        tried(lambda path: checked_recording(path, ("LASI", "RTOE"), 1.0), "made.c3d", bytes(data))
+        tried(lambda path: checked(path, ("LASI", "RTOE"), 1.0), "made.c3d", bytes(data))
+
+
+def damage(positions: np.ndarray, rng: random.Random) -> np.ndarray:
+    """Return marker positions (n, m, 3) with something wrong in them."""
+    made, (frames, markers, _) = positions.copy(), positions.shape
+    frame, marker = rng.randrange(1, frames), rng.randrange(markers)
+    match rng.randrange(10):
+        case 0:
+            made[frame : frame + rng.randrange(60), rng.randrange(markers) :] = np.nan
+        case 1:
+            made[:, marker] = np.nan
+        case 2:
+            made *= 10.0 ** rng.randint(-4, 4)
+        case 3:
+            made[frame:, marker] += rng.choice([0.3, 5.0, 1e30])
+        case 4:
+            made[:] = made[frame]
+        case 5:
+            made = made[..., [rng.randrange(3) for _ in range(3)]]
+        case 6:
+            made = np.concatenate([made, made[::-1]])
+        case 7:
+            made = made[:frame]
+        case 8:
+            made *= [rng.choice([1.0, -1.0, 0.0]) for _ in range(3)]
+        case _:
+            made[np.random.default_rng(frame).random(made.shape[:2]) < 0.7] = np.nan
+    return made
+
+
+@given(seed=st.integers(0, 2**63))
+def test_recordings_with_anything_in_them_are_evaluated_or_refused(seed: int) -> None:
+    rng = random.Random(seed)
+    recording = c3d.read_c3d(write_c3d(folder() / "whole.c3d", plate=True))
+    positions = recording.positions
+    for _ in range(rng.randrange(1, 4)):
+        positions = damage(positions, rng)
+    samples = len(positions) * recording.samples_per_frame
+    (plate,) = recording.plates
+    corners = plate.corners[[rng.randrange(4) for _ in range(4)]]
+    force = np.resize(plate.force, (samples, 3)) * rng.choice([1.0, -1.0, 0.0, 1e6])
+    moment = np.resize(plate.moment, (samples, 3)) * rng.choice([1.0, -1.0, 1e3])
+    plate = replace(plate, corners=corners, force=force, moment=moment)
+    events = tuple(
+        replace(event, frame=rng.randrange(len(positions)))
+        for event in recording.events[: rng.randrange(8)]
+    )
+    broken = replace(recording, positions=positions, plates=(plate,), events=events)
+    write_recording(folder() / "walk.c3d", broken)
+    patient, config = load_patient("sreenivasa2017-patient"), RecordedConfig(patient="")
+
+    def read(path: Path) -> None:
+        for trial, _ in c3d_trials(path, patient, "barefoot", config):
+            assert np.isfinite(trial.motion.values).all()
+            assert all(map(str.isprintable, (*trial_notes([trial]), *trial.doubts)))
+
+    tried(read, "walk.c3d", (folder() / "walk.c3d").read_bytes())
 
 
 @given(seed=st.integers(0, 2**63), content=st.binary(max_size=200))

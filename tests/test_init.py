@@ -15,15 +15,13 @@ from pydantic import BaseModel
 
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
-from pathwalker_cli.inverse.forces import plate_load
+from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.recorded import with_block
 from pathwalker_cli.inverse.study import (
     RecordedConfig,
     load_inverse_dynamics,
     load_inverse_kinematics,
 )
-from pathwalker_cli.inverse.trials import c3d_trial
-from pathwalker_cli.io.c3d import ForcePlate
 from pathwalker_cli.io.commented_yaml import entries, reasons
 from pathwalker_cli.io.fields import Sides
 from pathwalker_cli.paths import shipped
@@ -236,27 +234,13 @@ def test_made_recordings_say_so_and_give_back_the_motion(tmp_path: Path) -> None
     path = tmp_path / "made.c3d"
     example.write_c3d(path, recording, description="Made by PathWalker; not recorded")
     assert "not recorded" in ezc3d.c3d(str(path))["parameters"]["TRIAL"]["DESCRIPTION"]["value"][0]
-    trial, _ = c3d_trial(path, patient, "barefoot", RecordedConfig(patient=patient.id))
+    ((trial, _),) = c3d_trials(path, patient, "barefoot", RecordedConfig(patient=patient.id))
     assert 0.5e-3 < trial.markers.mean < 2e-3, "what remains is the noise"
     assert [s.measured for s in trial.stances if s.plate is not None] == [True]
     assert trial.forces is not None
     single = trial.forces["force_r_z"]
     weight = 9.81 * patient.body_mass
     assert 0.8 < np.nanmax(single) / weight < 1.6
-
-
-def test_channels_of_a_plate_give_back_force_and_point() -> None:
-    force = np.array([[10.0, -5.0, 300.0], [0.0, 0.0, 250.0]])
-    point = np.array([[0.05, -0.02], [-0.1, 0.03]])
-    size = (0.2, 0.06, 0.03)
-    corners = np.array([[0.25, 0.1, 0.0], [-0.25, 0.1, 0.0], [-0.25, -0.1, 0.0], [0.25, -0.1, 0.0]])
-    plate = ForcePlate("plate 1", corners, *size, example.plate_channels(force, point, *size))
-    load = plate_load(plate)
-    assert load.force == pytest.approx(force)
-    fx, fy, fz = load.force.T
-    mx, my, _ = load.moment.T
-    assert -(my + size[2] * fx) / fz == pytest.approx(point[:, 0])
-    assert (mx - size[2] * fy) / fz == pytest.approx(point[:, 1])
 
 
 def test_a_block_is_replaced_and_the_rest_kept() -> None:

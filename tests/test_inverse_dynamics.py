@@ -12,6 +12,7 @@ import pytest
 
 from pathwalker_cli.conventions import COORDINATES, GRAVITY, Condition
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.cycles import GaitCycle, Stance, cycle_band, resampled
 from pathwalker_cli.inverse.dynamics import inverse_dynamics
 from pathwalker_cli.inverse.forces import force_columns
@@ -36,7 +37,8 @@ from pathwalker_cli.inverse.strengths import (
     strengths_of,
 )
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, RecordedConfig
-from pathwalker_cli.inverse.trials import Trial, c3d_trial, dynamics_trials, with_torques
+from pathwalker_cli.inverse.trial import Trial
+from pathwalker_cli.inverse.trials import dynamics_trials, with_torques
 from pathwalker_cli.io.c3d import read_c3d
 from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.model.urdf import pinocchio_model
@@ -254,7 +256,7 @@ def test_own_residuals_and_strengths() -> None:
     names = ("3053176", "3053178", "3053179", "3053183", "3053184")
     paths = [SHARED / "recordings" / "barefoot" / f"{name}.c3d" for name in names]
     trials = [
-        with_torques(c3d_trial(path, patient, "barefoot", config)[0], patient) for path in paths
+        with_torques(c3d_trials(path, patient, "barefoot", config)[0][0], patient) for path in paths
     ]
     found = [residuals(t.name, t.tau.values) for t in trials if t.tau is not None]
     table = residual_range(found)

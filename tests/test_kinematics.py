@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -18,8 +19,8 @@ from pathwalker_cli.inverse.markers import (
     bridge_gaps,
     load_marker_set,
     marker_points,
-    walking_plane,
 )
+from pathwalker_cli.inverse.walk import StandingError, walks
 from pathwalker_cli.io.c3d import Recording, read_c3d
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import load_patient
@@ -75,8 +76,8 @@ def walker(condition: Condition = "barefoot") -> tuple[pin.Model, tuple[MarkerPo
     return pinocchio_model(patient, condition), points
 
 
-def made(forward: int = 0, sign: int = 1, frames: int = 30) -> tuple[Recording, np.ndarray]:
-    """Return a recording of a known motion along a laboratory axis, and the motion's q."""
+def made(frames: int = 30) -> tuple[Recording, np.ndarray]:
+    """Return a recording of a known motion along the laboratory's x, and the motion's q."""
     model, points = walker()
     phase = np.linspace(0.0, 2.0, frames)[:, None]
     q = 0.3 * np.sin(phase * np.arange(1, 11)) + np.array(
@@ -85,25 +86,27 @@ def made(forward: int = 0, sign: int = 1, frames: int = 30) -> tuple[Recording, 
     q[:, 0] = phase[:, 0] * 0.6
     placed = np.array([_Fit(model, points).positions(row)[0] for row in q])
     names = tuple(dict.fromkeys(point.marker for point in points))
-    positions = np.zeros((frames, len(names), 3))
+    positions = np.full((frames, len(names), 3), 0.1)
     for column, point in enumerate(points):
-        target = positions[:, names.index(point.marker)]
-        target[:, forward] = sign * placed[:, column, 0]
-        target[:, 1 - forward] = 0.1
-        target[:, 2] = placed[:, column, 1]
+        positions[:, names.index(point.marker)][:, [0, 2]] = placed[:, column]
     return Recording("made", 120.0, names, positions, (), (), 0), q
 
 
-@pytest.mark.parametrize("forward", [0, 1])
-@pytest.mark.parametrize("sign", [1, -1])
-def test_known_motion_is_found_in_any_walking_direction(forward: int, sign: int) -> None:
+@pytest.mark.parametrize("degrees", [0.0, 10.0, 90.0, 137.0, 180.0, -90.0])
+@pytest.mark.parametrize("up", [(0, 1, 2), (2, 0, 1), (1, 2, 0)], ids=["z up", "x up", "y up"])
+def test_known_motion_is_found_whatever_the_axes(degrees: float, up: tuple[int, ...]) -> None:
     model, points = walker()
-    recording, q = made(forward, sign)
-    motion, residuals = inverse_kinematics(model, recording, points)
+    recording, q = made()
+    x, y = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    axes = np.array([[x, y, 0.0], [-y, x, 0.0], [0.0, 0.0, 1.0]])[:, list(up)]
+    (walk,) = walks(replace(recording, positions=recording.positions @ axes), points)
+    motion, residuals = inverse_kinematics(model, walk, points)
     assert motion.names == COORDINATES
     assert motion.units[:3] == ("m", "m", "rad")
-    assert motion.values == pytest.approx(q, abs=1e-7)
+    assert motion.values[:, 1:] == pytest.approx(q[:, 1:], abs=1e-7)
+    assert np.diff(motion.values[:, 0]) == pytest.approx(np.diff(q[:, 0]), abs=1e-7)
     assert residuals.distances.max() < 1e-7
+    assert ("vertical" in "".join(walk.remarks)) == (up != (0, 1, 2))
 
 
 @pytest.mark.parametrize(("condition", "markers", "expected"), MEASURED)
@@ -159,7 +162,7 @@ def test_too_few_markers_are_refused() -> None:
     positions = recording.positions.copy()
     positions[4, 4:] = np.nan
     holed = Recording("holed", 120.0, recording.markers, positions, (), (), 0)
-    with pytest.raises(DataError, match="holed, frame 4: shows"):
+    with pytest.raises(DataError, match="holed, frame 5: shows"):
         inverse_kinematics(model, holed, points)
 
 
@@ -186,15 +189,10 @@ def test_gaps_are_bridged_up_to_a_length_and_reported() -> None:
 def test_direction_must_be_certain() -> None:
     recording, _ = made()
     still = Recording(
-        "still", 120.0, recording.markers, recording.positions[:1].repeat(9, 0), (), (), 0
+        "still", 120.0, recording.markers, recording.positions[:1].repeat(30, 0), (), (), 0
     )
-    with pytest.raises(DataError, match=r"still: LASI, SACR travel 0.00 m"):
-        walking_plane(still, ("LASI", "SACR"))
-    turned = recording.positions.copy()
-    turned[:, :, 1] = turned[:, :, 0]
-    diagonal = Recording("diagonal", 120.0, recording.markers, turned, (), (), 0)
-    with pytest.raises(DataError, match="along one laboratory axis"):
-        walking_plane(diagonal, ("LASI",))
+    with pytest.raises(StandingError, match=r"still: LASI, SACR travel 0.00 m"):
+        walks(still, walker()[1])
 
 
 def test_marker_set_scales_with_height_and_refuses_nonsense(tmp_path: Path) -> None:

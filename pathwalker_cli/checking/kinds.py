@@ -22,6 +22,7 @@ from pathwalker_cli.checking.studies import check_batch, check_study
 from pathwalker_cli.config import StudyConfig, config_content, find_config
 from pathwalker_cli.conventions import CONDITIONS
 from pathwalker_cli.errors import ConfigError, placed
+from pathwalker_cli.inverse.c3d_trials import read_markers
 from pathwalker_cli.inverse.markers import MarkerSet, load_marker_set, marker_points
 from pathwalker_cli.inverse.study import (
     InverseDynamicsConfig,
@@ -31,7 +32,7 @@ from pathwalker_cli.inverse.study import (
     load_inverse_kinematics,
 )
 from pathwalker_cli.inverse.trials import require_trials
-from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording
+from pathwalker_cli.io.c3d_checks import c3d_files
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.yaml_file import load_yaml
 from pathwalker_cli.model.walker import build_walker
@@ -130,14 +131,12 @@ def _require_none(changes: Changes, path: str) -> None:
 
 def _c3d(config: RecordedConfig, patient: Patient) -> dict[str, list[str]]:
     """Return the C3D files of a study by condition, each looked into."""
-    markers = load_marker_set(config.markers)
     trials: dict[str, list[str]] = {}
     with placed("c3d"):
         files = {c: c3d_files(config.c3d.of(c)) for c in config.recorded_conditions}
     for condition, paths in files.items():
-        names = [point.marker for point in marker_points(markers, patient, condition)]
         for file in paths:
-            checked_recording(file, names, patient.height)
+            read_markers(file, patient, condition, config)
         trials[condition] = [file.stem for file in paths]
     return trials
 

@@ -3,24 +3,42 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from pathwalker_cli.starter.child import Child
 
 
 @click.command("init")
 @click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument("walks", nargs=-1, type=click.Path(path_type=Path), metavar="[C3D...]")
 @click.option("--id", "name", metavar="NAME", help="Code of the child; name of DIR if left out.")
 @click.option("--age", type=float, metavar="YEARS", help="Age, 4 to 15; 9 if left out.")
 @click.option("--mass", type=float, metavar="KG", help="Body mass; from the age if left out.")
 @click.option("--height", type=float, metavar="M", help="Height; from the age if left out.")
+@click.option("--sex", type=click.Choice(["female", "male"]), help="Needed with --from.")
+@click.option(
+    "--from",
+    "source",
+    type=click.Path(path_type=Path),
+    metavar="C3D",
+    help="Measure the child in a recorded pose or walk; C3D... are its barefoot walks.",
+)
+@click.option("--subject", metavar="NAME", help="Whose markers, if that file names several.")
 @click.option("--without-orthosis", is_flag=True, help="Of a child that only walks barefoot.")
 @click.option("--example", is_flag=True, help="Also make C3D recordings of the child, to try all.")
 def init_command(
     folder: Path,
+    walks: tuple[Path, ...],
     name: str | None,
     age: float | None,
     mass: float | None,
     height: float | None,
+    sex: str | None,
+    source: Path | None,
+    subject: str | None,
     without_orthosis: bool,
     example: bool,
 ) -> None:
@@ -29,23 +47,81 @@ def init_command(
     The files hold the numbers of a made-up child, so everything runs as it is; every key has a
     comment with its unit and where to measure it. With --example, C3D files are made too: gait that
     was recorded of another child, played by the model of the made-up one. DIR must be new or empty.
-    """
-    import re
-    import shlex
 
+    With --from, body mass, height, lengths and feet are those of a recording with a marker set that
+    is recognised, and the file says where each number comes from; walks are copied to c3d/barefoot.
+    """
+    from pathwalker_cli.errors import DataError
+    from pathwalker_cli.io.c3d_checks import c3d_files
     from pathwalker_cli.starter.child import made_child
     from pathwalker_cli.starter.files import command_lines, next_steps, write_folder
 
-    safe = re.sub(r"[^A-Za-z0-9_-]+", "-", folder.resolve().name).strip("-_")[:64] or "child"
-    child = made_child(name or safe, age, mass, height)
+    id_ = name or _safe(folder.resolve().name)
+    if source:
+        if example:
+            raise DataError(
+                "makes up what --from measures", where="--example", mend="leave one out"
+            )
+        child = _measured_child(id_, age, sex, mass, height, source, subject)
+    elif walks:
+        mend = "add --from with a pose or a walk of the child"
+        raise DataError("is given without --from", where=str(walks[0]), mend=mend)
+    else:
+        child = made_child(id_, age, mass, height, **({"sex": sex} if sex else {}))
+    walks = c3d_files(walks)
     with_orthosis = not without_orthosis
-    write_folder(folder, child, with_orthosis, example)
+    write_folder(folder, child, with_orthosis, example, walks)
+    kind = "a child" if source else "a made-up child"
     click.echo(
-        f"Wrote {folder}: a made-up child of {child.age:g} years, {child.body_mass:g} kg and "
-        f"{child.height:g} m.\n\nNext:\n"
+        f"Wrote {folder}: {kind} of {child.age:g} years, {child.body_mass:g} kg and "
+        f"{child.height:g} m.\n"
     )
-    click.echo(f"{command_lines(f'cd {shlex.quote(str(folder))}', 2)}")
-    for number, step in enumerate(next_steps(with_orthosis, example), start=1):
+    for origin in child.sources:
+        click.echo(f"  {origin}")
+    click.echo("\nNext:\n" if source else "Next:\n")
+    click.echo(f"{command_lines(f'cd {_quoted(folder)}', 2)}")
+    for number, step in enumerate(next_steps(with_orthosis, example, bool(walks)), start=1):
         click.echo(f"\n{click.wrap_text(f'{number}. {step.why}', 80, '# ', '# ')}")
         for command in step.commands:
             click.echo(command_lines(command, 2))
+
+
+def _measured_child(
+    name: str,
+    age: float | None,
+    sex: str | None,
+    mass: float | None,
+    height: float | None,
+    source: Path,
+    subject: str | None,
+) -> Child:
+    """Return the child of a recording; what is given counts before what it tells."""
+    from pathwalker_cli.errors import DataError
+    from pathwalker_cli.inverse.body import measured_body
+    from pathwalker_cli.starter.child import made_child
+
+    if age is None or sex is None:
+        raise DataError(
+            "no recording tells a child's age and sex", where="--from", mend="add --age and --sex"
+        )
+    body = measured_body(source, mass, height, subject)
+    for what, value in (("--mass", body.mass), ("--height", body.height)):
+        if value is None:
+            raise DataError("is not in the file", where=what, mend=f"add {what}")
+    sources = ("age, sex: as given", *body.sources)
+    return made_child(name, age, body.mass, body.height, sex=sex, lengths=body.lengths,
+                      soles=body.soles, sources=sources)  # fmt: skip
+
+
+def _safe(name: str) -> str:
+    """Return the name of a folder as an id."""
+    import re
+
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-_")[:64] or "child"
+
+
+def _quoted(folder: Path) -> str:
+    """Return a path as a shell takes it."""
+    import shlex
+
+    return shlex.quote(str(folder))

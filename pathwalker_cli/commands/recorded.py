@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
     from pathwalker_cli.inverse.strengths import StrengthTable
     from pathwalker_cli.inverse.study import RecordedConfig
-    from pathwalker_cli.inverse.trials import Progress, Trial
+    from pathwalker_cli.inverse.trial import Trial
+    from pathwalker_cli.inverse.trials import Progress
     from pathwalker_cli.patient import Patient
 
     Config = TypeVar("Config", bound=RecordedConfig)
@@ -44,7 +45,9 @@ _SET = set_option("Override a config value.")
 )
 @click.option("--condition", required=True, type=click.Choice(CONDITIONS), help="What was worn.")
 @out_option("Output folder.", "-o", required=True, metavar=None)
-@click.option("--markers", help="Marker set; the shipped markers.yaml if left out.")
+@click.option("--markers", help="Marker set, a file; by the markers' names if left out.")
+@click.option("--subject", metavar="NAME", help="Whose markers, if a file names several.")
+@click.option("--mend-plates", is_flag=True, help="Mend plates that are stored wrongly.")
 @_QUIET
 def import_command(
     c3d: tuple[str, ...],
@@ -52,6 +55,8 @@ def import_command(
     condition: Condition,
     out: Path,
     markers: str | None,
+    subject: str | None,
+    mend_plates: bool,
     quiet: bool,
 ) -> None:
     """Turn C3D files, or folders of them, into angles, events and forces.
@@ -68,7 +73,14 @@ def import_command(
             write_trial(folder, trial)
 
     files = Paths.model_validate({condition: c3d})
-    config = RecordedConfig(patient=patient, conditions=(condition,), c3d=files, markers=markers)
+    config = RecordedConfig(
+        patient=patient,
+        conditions=(condition,),
+        c3d=files,
+        markers=markers,
+        subject=subject,
+        mend_plates=mend_plates,
+    )
     _study(config, kinematics_trials, write, out, quiet)
 
 
@@ -181,7 +193,7 @@ def _study(
     """Evaluate the trials of a config, write all files or none, and report."""
     from rich.console import Console
 
-    from pathwalker_cli.inverse.text import stance_notes, trial_warnings, trials_renderable
+    from pathwalker_cli.inverse.text import trial_notes, trial_warnings, trials_renderable
     from pathwalker_cli.io.atomic import staged_folder
     from pathwalker_cli.patient import load_patient
 
@@ -196,7 +208,7 @@ def _study(
     # As wide as the terminal, or wide enough without one.
     quiet = quiet or findings.content is not None
     console = Console(quiet=quiet, width=None if Console().is_terminal else 120)
-    notes = [f"note: {note}" for note in stance_notes(trials)]
+    notes = [f"note: {note}" for note in trial_notes(trials)]
     ends = [f"Written to {out}", *filter(None, [findings.changed])]
     for part in (trials_renderable(trials), *notes, *findings.tables, *ends):
         plain = isinstance(part, str)

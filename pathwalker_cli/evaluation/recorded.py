@@ -17,7 +17,8 @@ from pathwalker_cli.inverse.dynamics import frame_rate
 from pathwalker_cli.inverse.recorded import trial_steps
 from pathwalker_cli.inverse.strengths import stance_curves
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
-from pathwalker_cli.inverse.trials import Trial, recorded_trials
+from pathwalker_cli.inverse.trial import Trial
+from pathwalker_cli.inverse.trials import recorded_trials
 from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.stride.measures import measures_in

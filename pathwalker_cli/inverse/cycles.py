@@ -11,7 +11,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import ANGLES, SIDES, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.io.c3d import Event, EventKind
+from pathwalker_cli.io.c3d_events import Event, EventKind
 from pathwalker_cli.trajectory import Trajectory
 
 OTHER: Final[Mapping[Side, Side]] = {"right": "left", "left": "right"}

@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from pathwalker_cli.conventions import GRAVITY, SIDES, SUFFIX, Condition, Side, to_degrees
 from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.inverse.cycles import POINTS, CycleBand, cycle_band, gait_cycles
-from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.model.skeleton import PLANAR_WALKER
 from pathwalker_cli.patient import Patient

@@ -12,7 +12,7 @@ from pathwalker_cli.inverse.figures import save_recorded_figures
 from pathwalker_cli.inverse.recorded import strength_lines
 from pathwalker_cli.inverse.residuals import COMPONENTS, ResidualTable
 from pathwalker_cli.inverse.strengths import StrengthTable
-from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.io.csv_file import as_text, write_table
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.io.opensim import force_table, torque_table, write_opensim

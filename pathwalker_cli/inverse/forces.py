@@ -7,7 +7,7 @@ which means "not measured".  A foot in the air has zero force.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -17,83 +17,43 @@ from pathwalker_cli.conventions import GRAVITY, SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.cycles import stances, swings
 from pathwalker_cli.inverse.dynamics import FORCE_CUTOFF, low_pass, smooth_rates
-from pathwalker_cli.inverse.markers import WalkingPlane
+from pathwalker_cli.inverse.plate_checks import Footprint, plate_faults
 from pathwalker_cli.inverse.stance_checks import (
     EDGE,
     LOADED,
     Evidence,
     StanceForce,
     judge,
+    off_plate,
     outside,
 )
-from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
+from pathwalker_cli.inverse.walk import about_vertical, turned
+from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.io.c3d_events import Event
+from pathwalker_cli.io.c3d_plates import ForcePlate
 from pathwalker_cli.io.recordings import FORCE_COLUMNS
 from pathwalker_cli.trajectory import Trajectory
 
 _FAR: Final = 0.2
 """Distance beyond which it does not matter how far a load lies from a foot [m]."""
 
+_TOES: Final = 0.39
+"""How far toes reach beyond the toe marker on the second metatarsal head, as a share of heel to toe
+marker: the head lies at 72 % of the foot's length."""
 
-@dataclass(frozen=True)
-class PlateLoad:
-    """What a plate measures, at its sensors' level below its centre.
-
-    Args:
-        force: Ground reaction force on the body [N], laboratory axes, shape (samples, 3).
-        moment: Moment about the plate's centre at the sensors' level [N m], laboratory axes.
-        centre: Centre of the plate's surface in the laboratory [m], shape (3,).
-        depth: Depth of the sensors below the surface [m].
-    """
-
-    force: np.ndarray
-    moment: np.ndarray
-    centre: np.ndarray
-    depth: float
+_HEADINGS: Final = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
 
 
-def plate_load(plate: ForcePlate, channels: np.ndarray | None = None) -> PlateLoad:
-    """Return the load of a plate from its eight channels.
-
-    Args:
-        plate: The plate.
-        channels: Its channels, already filtered or averaged [N], shape (samples, 8); those of the
-            plate if left out.
-    """
-    x12, x34, y14, y23, z1, z2, z3, z4 = (plate.channels if channels is None else channels).T
-    a, b = plate.half_length, plate.half_width
-    force = np.stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4], axis=-1)
-    moment = np.stack(
-        [
-            b * (z1 + z2 - z3 - z4),
-            a * (-z1 + z2 + z3 - z4),
-            b * (-x12 + x34) + a * (y14 - y23),
-        ],
-        axis=-1,
-    )
-    axes = _axes(plate.corners)
-    return PlateLoad(force @ axes, moment @ axes, plate.corners.mean(axis=0), plate.depth)
-
-
-def _axes(corners: np.ndarray) -> np.ndarray:
-    """Return the plate's unit axes in the laboratory, one a row."""
-    x = corners[0] - corners[1]
-    z = np.cross(x, corners[0] - corners[3])
-    y = np.cross(z, x)
-    return np.stack([axis / np.linalg.norm(axis) for axis in (x, y, z)])
-
-
-def centre_of_pressure(load: PlateLoad, least_force: float) -> np.ndarray:
+def centre_of_pressure(load: ForcePlate, least_force: float) -> np.ndarray:
     """Return where the force's line of action meets the plate's surface [m], shape (samples, 3).
 
     Without a moment about a horizontal axis at the surface; NaN where the vertical force is below
     `least_force` [N].
     """
-    fx, fy, fz = load.force.T
+    fz = load.force[:, 2]
     mx, my, _ = load.moment.T
     with np.errstate(divide="ignore", invalid="ignore"):
-        x = -(my + load.depth * fx) / fz
-        y = (mx - load.depth * fy) / fz
-    point = np.stack([x, y, np.zeros_like(fz)], axis=-1) + load.centre
+        point = np.stack([-my / fz, mx / fz, np.zeros_like(fz)], axis=-1) + load.centre
     point[fz < least_force] = np.nan
     return point
 
@@ -106,12 +66,14 @@ class GroundForces:
         table: Columns of `FORCE_COLUMNS` in every frame, NaN where not measured (centre of
             pressure: or without load).
         stances: What is known about every stance.
-        plane: How the walking direction lies in the plates' laboratory axes.
+        direction: Axis of the plates along which the patient walks, e.g. "-y".
+        remarks: What was found wrong with the plates, a sentence each.
     """
 
     table: Trajectory
     stances: tuple[StanceForce, ...]
-    plane: WalkingPlane
+    direction: str = "+x"
+    remarks: tuple[str, ...] = ()
 
 
 def force_columns(time: np.ndarray, feet: Mapping[Side, np.ndarray]) -> Trajectory:
@@ -129,35 +91,91 @@ def ground_forces(
     recording: Recording,
     model: pin.Model,
     motion: Trajectory,
-    plane: WalkingPlane | None = None,
+    aside: Mapping[Side, np.ndarray] | None = None,
     cutoff: float = FORCE_CUTOFF,
+    mend: bool = False,
 ) -> GroundForces:
     """Return the forces on both feet over the frames of a recording.
 
     Args:
-        recording: The recording.
+        recording: The recording; its plates have x along the walk if `aside` is given.
         model: The walker, for the extents of its feet and its weight.
         motion: Its coordinates in every frame, from `inverse_kinematics`.
-        plane: How the walking direction lies in the plates' laboratory axes; that in which the
-            loads lie under the feet if left out.
-        cutoff: Cut-off frequency of the plate channels [Hz].
+        aside: Per side, sideways position of the foot [m], shape (n,).  Without it the markers
+            were laid into the walking plane, and the plates are turned to that of their axes for
+            which the loads lie under the feet.
+        cutoff: Cut-off frequency of the plates [Hz].
+        mend: Whether to mend plates that are not stored as they stand.
 
     Raises:
         DataError: If the recording has no force plates.
     """
     if not recording.plates:
         raise DataError("has no force plates", where=recording.name)
-    loads = [_load(plate, recording, cutoff) for plate in recording.plates]
-    feet = foot_extents(model, motion.values)
-    plane = plane or plate_direction(loads, feet, recording.events)
-    up = np.stack([load.force[:, 2] for load in loads], axis=1)
-    points = np.stack(
-        [plane.project(centre_of_pressure(load, LOADED))[:, 0] for load in loads], axis=1
+    feet, direction = foot_extents(model, motion.values), "+x"
+    loads = plate_loads(recording, cutoff)
+    if aside is None:
+        direction = plate_direction(loads, feet, recording.events)
+        loads = _turned(recording, loads, direction)
+    weight = GRAVITY * pin.computeTotalMass(model)
+    prints = _footprints(model, feet, aside)
+    faults = plate_faults(loads, stances(recording.events), prints, weight)
+    remarks = tuple(
+        f"{loads[fault.plate].name} is {'mended' if mend else 'not used'}: {fault.what}"
+        for fault in faults
     )
-    seen = Evidence(recording.events, up, points, feet, _carried(model, motion))
+    for fault in faults if mend else ():
+        loads[fault.plate] = fault.mended
+    points = np.stack([centre_of_pressure(load, LOADED)[:, 0] for load in loads], axis=1)
+    seen = Evidence(
+        recording.events,
+        np.stack([load.force[:, 2] for load in loads], axis=1),
+        points,
+        prints,
+        _carried(model, motion),
+        {side: off_plate(foot, loads) for side, foot in prints.items()},
+        {} if mend else {fault.plate: fault.what for fault in faults},
+        recording.first_frame,
+    )
     judged = tuple(judge(stance, seen) for stance in stances(recording.events))
-    table = _compose(recording, judged, [plane.project(load.force) for load in loads], points)
-    return GroundForces(table, judged, plane)
+    table = _compose(recording, judged, [load.force[:, [0, 2]] for load in loads], points)
+    return GroundForces(table, judged, direction, remarks)
+
+
+def plate_loads(recording: Recording, cutoff: float = FORCE_CUTOFF) -> list[ForcePlate]:
+    """Return the plates with their loads at the marker frames, unloaded level removed, filtered."""
+    per_frame, frames = recording.samples_per_frame, recording.positions.shape[0]
+    loads = []
+    for plate in recording.plates:
+        wrench = np.hstack([plate.force, plate.moment])
+        idle = np.abs(plate.force[:, 2]) < LOADED
+        if idle.any():
+            wrench = wrench - np.median(wrench[idle], axis=0)
+        smooth = low_pass(wrench, recording.rate * per_frame, cutoff)[::per_frame][:frames]
+        loads.append(replace(plate, force=smooth[:, :3], moment=smooth[:, 3:]))
+    return loads
+
+
+def _turned(recording: Recording, loads: list[ForcePlate], direction: str) -> list[ForcePlate]:
+    """Return plates with x along a direction."""
+    axes = about_vertical(np.array(_HEADINGS[direction]))
+    return list(turned(replace(recording, plates=tuple(loads)), axes).plates)
+
+
+def _footprints(
+    model: pin.Model,
+    feet: Mapping[Side, np.ndarray],
+    aside: Mapping[Side, np.ndarray] | None,
+) -> dict[Side, Footprint]:
+    """Return where both feet are on the ground, toes included."""
+    neutral = foot_points(model, np.zeros((1, model.nq)))
+    prints = {}
+    for side, ends in feet.items():
+        heel, toe = neutral[side][0]
+        length = float(np.linalg.norm(toe - heel))
+        sideways = np.full(len(ends), np.nan) if aside is None else aside[side]
+        prints[side] = Footprint(ends + np.array([0.0, _TOES * length]), sideways, length)
+    return prints
 
 
 def foot_extents(model: pin.Model, q: np.ndarray) -> dict[Side, np.ndarray]:
@@ -178,9 +196,9 @@ def foot_points(model: pin.Model, q: np.ndarray) -> dict[Side, np.ndarray]:
 
 
 def plate_direction(
-    loads: Sequence[PlateLoad], feet: Mapping[Side, np.ndarray], events: Sequence[Event]
-) -> WalkingPlane:
-    """Return the laboratory direction of walking for which the loads lie under the standing feet.
+    loads: Sequence[ForcePlate], feet: Mapping[Side, np.ndarray], events: Sequence[Event]
+) -> str:
+    """Return the laboratory axis along which the loads lie under the standing feet, e.g. "-y".
 
     Markers may have been turned into the walking plane while the plates were left as they were,
     so the markers' direction does not tell.
@@ -195,26 +213,15 @@ def plate_direction(
     for stance in stances(events):
         rows = slice(stance.strike, stance.toe_off)
         standing[stance.side][rows] = feet[stance.side][rows]
-    misses: list[tuple[float, WalkingPlane]] = []
-    for plane in (WalkingPlane(axis, sign) for axis in (0, 1) for sign in (1, -1)):
-        points = [plane.project(centre_of_pressure(load, 5.0 * LOADED))[:, 0] for load in loads]
+    misses: list[tuple[float, str]] = []
+    for name, heading in _HEADINGS.items():
+        points = [centre_of_pressure(load, 5.0 * LOADED)[:, :2] @ heading for load in loads]
         gaps = np.array([[outside(point, standing[side]) for side in SIDES] for point in points])
         nearest = np.fmin(gaps[:, 0], gaps[:, 1])
         seen = nearest[np.isfinite(nearest)]
         if seen.size:
-            misses.append((float(np.minimum(seen, _FAR).mean()), plane))
-    return min(misses, key=lambda item: item[0])[1] if misses else WalkingPlane(0, 1)
-
-
-def _load(plate: ForcePlate, recording: Recording, cutoff: float) -> PlateLoad:
-    """Return the load at the marker frames, unloaded level removed and filtered."""
-    channels = plate.channels
-    idle = np.abs(channels[:, 4:].sum(axis=1)) < LOADED
-    if idle.any():
-        channels = channels - np.median(channels[idle], axis=0)
-    per_frame = recording.samples_per_frame
-    smooth = low_pass(channels, recording.rate * per_frame, cutoff)
-    return plate_load(plate, smooth[::per_frame][: recording.positions.shape[0]])
+            misses.append((float(np.minimum(seen, _FAR).mean()), name))
+    return min(misses, key=lambda item: item[0])[1] if misses else "+x"
 
 
 def _carried(model: pin.Model, motion: Trajectory) -> np.ndarray:

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from pathwalker_cli.conventions import COORDINATES, TRANSLATIONS, coordinate_unit
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.markers import MarkerPoint, WalkingPlane, walking_plane
+from pathwalker_cli.inverse.markers import MarkerPoint
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.trajectory import Trajectory
 
@@ -60,15 +60,13 @@ def inverse_kinematics(
     model: pin.Model,
     recording: Recording,
     points: tuple[MarkerPoint, ...],
-    plane: WalkingPlane | None = None,
 ) -> tuple[Trajectory, MarkerResiduals]:
     """Fit the walker to the markers in every frame; nothing is filtered.
 
     Args:
         model: The walker, its q in the order of `COORDINATES`.
-        recording: The recording.
+        recording: The recording, x along the walk and z up.
         points: Where its markers sit on the walker.
-        plane: Walking plane; that of the pelvis markers' travel if left out.
 
     Returns:
         The coordinates over time, time from the first frame on, and the distances that remain.
@@ -76,27 +74,22 @@ def inverse_kinematics(
     Raises:
         DataError: If a marker is unknown, a frame shows too little, or the fit does not settle.
     """
-    plane = plane or walking_plane(recording, pelvis_markers(points))
-    names = tuple(point.marker for point in points)
-    targets = plane.project(np.stack([recording.marker(name) for name in names], axis=1))
+    paths = [recording.marker(point.marker) for point in points]
+    targets = np.stack(paths, axis=1)[..., [0, 2]]
     fit = _Fit(model, points)
     q = fit.start(targets[0])
     values = np.empty((targets.shape[0], model.nq))
     distances = np.empty(targets.shape[:2])
     for frame, target in enumerate(targets):
-        q, residuals = fit.solve(target, q, f"{recording.name}, frame {frame}")
+        q, residuals = fit.solve(
+            target, q, f"{recording.name}, frame {recording.first_frame + frame}"
+        )
         values[frame] = q
         distances[frame] = np.hypot(residuals[:, 0], residuals[:, 1])
     distances.setflags(write=False)
     units = tuple(coordinate_unit(name) for name in COORDINATES)
     trajectory = Trajectory(recording.time, COORDINATES, values, units)
     return trajectory, MarkerResiduals(tuple(point.name for point in points), distances)
-
-
-def pelvis_markers(points: tuple[MarkerPoint, ...]) -> tuple[str, ...]:
-    """Return the markers on the pelvis, or all if there are none."""
-    pelvis = [point for point in points if point.link == "pelvis"]
-    return tuple(point.marker for point in pelvis or points)
 
 
 def marker_paths(model: pin.Model, points: tuple[MarkerPoint, ...], q: np.ndarray) -> np.ndarray:

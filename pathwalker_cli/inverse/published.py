@@ -10,6 +10,7 @@ References:
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -20,9 +21,9 @@ from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.cycles import GaitCycle, gait_cycles
 from pathwalker_cli.inverse.dynamics import inverse_dynamics
-from pathwalker_cli.inverse.forces import PlateLoad, force_columns, plate_load
-from pathwalker_cli.inverse.markers import WalkingPlane
+from pathwalker_cli.inverse.forces import force_columns
 from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.io.c3d_plates import ForcePlate
 from pathwalker_cli.trajectory import Trajectory
 
 AVERAGED_TRIALS: Final = {
@@ -86,17 +87,23 @@ def flagged_cycles(recording: Recording) -> tuple[GaitCycle, ...]:
 
 def _forces(recording: Recording) -> Trajectory:
     """Return the forces on both feet as the published evaluation has them."""
-    plane = WalkingPlane(axis=1, sign=1 if recording.name in TURNED else -1)
-    loads = [
-        plate_load(plate, _frame_means(plate.channels, recording.samples_per_frame))
+    ahead = 1.0 if recording.name in TURNED else -1.0  # along the laboratory's y
+    means = [
+        _frame_means(np.hstack([plate.force, plate.moment]), recording.samples_per_frame)
         for plate in recording.plates
+    ]
+    loads = [
+        replace(plate, force=mean[:, :3], moment=mean[:, 3:])
+        for plate, mean in zip(recording.plates, means, strict=True)
     ]
     feet = {}
     for side in SIDES:
         rows = _first_stance(recording, side)
         load = max(loads, key=lambda load: (load.force[rows] ** 2).sum())
-        centre = plane.project(wrench_axis_at_ground(load))
-        feet[side] = np.column_stack([plane.project(load.force), centre[:, 0]])
+        centre = wrench_axis_at_ground(load)
+        feet[side] = np.column_stack(
+            [ahead * load.force[:, 1], load.force[:, 2], ahead * centre[:, 1]]
+        )
     return force_columns(recording.time, feet)
 
 
@@ -123,7 +130,7 @@ def _first_stance(recording: Recording, side: Side) -> slice:
     raise DataError(f"has no stance of the {side} foot", where=recording.name)
 
 
-def wrench_axis_at_ground(load: PlateLoad) -> np.ndarray:
+def wrench_axis_at_ground(load: ForcePlate) -> np.ndarray:
     """Return the published evaluation's centre of pressure [m], shape (samples, 3).
 
     It is the point of the wrench's axis that is nearest to the plate's centre, F x M / |F|^2, set
@@ -131,6 +138,7 @@ def wrench_axis_at_ground(load: PlateLoad) -> np.ndarray:
     """
     square = (load.force**2).sum(axis=1, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
-        point = np.cross(load.force, load.moment) / square + load.centre
+        moment = load.moment - np.cross(load.force, load.origin)  # about the sensors' level
+        point = np.cross(load.force, moment) / square + load.centre
     point[:, 2] = 0.0
     return point

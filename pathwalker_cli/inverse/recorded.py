@@ -14,9 +14,9 @@ from pathwalker_cli.errors import DataError, PatientError
 from pathwalker_cli.inverse.cycles import gait_cycles, joint_ranges, step_lengths, walking_speed
 from pathwalker_cli.inverse.dynamics import frame_rate
 from pathwalker_cli.inverse.forces import foot_extents
-from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.io.atomic import atomic_open
-from pathwalker_cli.io.c3d import Event
+from pathwalker_cli.io.c3d_events import Event
 from pathwalker_cli.io.recordings import CompactRecording
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient, shipped_patients

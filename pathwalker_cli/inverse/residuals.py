@@ -12,7 +12,7 @@ from pathwalker_cli.conventions import COORDINATES, GRAVITY, ROOT, SIDES, Condit
 from pathwalker_cli.inverse.cycles import single_support, stances
 from pathwalker_cli.inverse.published import EVENT_SHIFT
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
-from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.patient import Patient
 
 COMPONENTS: Final[Mapping[str, str]] = {"forward": "N", "up": "N", "moment": "N m"}

@@ -25,7 +25,7 @@ from pathwalker_cli.inverse.cycles import resampled
 from pathwalker_cli.inverse.dynamics import MOTION_CUTOFF, frame_rate, smooth_rates
 from pathwalker_cli.inverse.published import forward_difference, published_filter
 from pathwalker_cli.inverse.study import InverseDynamicsConfig
-from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.io.fields import Sides
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, curves_of, generators
 from pathwalker_cli.model.elements.tissue import passive_series

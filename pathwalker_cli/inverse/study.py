@@ -37,6 +37,8 @@ class RecordedConfig(YamlModel):
     conditions: tuple[Condition, ...] = CONDITIONS
     c3d: Paths = Paths()
     markers: str | None = None
+    subject: str | None = None
+    mend_plates: bool = False
     longest_gap: Annotated[float, Quantity("s", 0.0, 1.0, above="is it in frames?")] = LONGEST_GAP
     largest_marker_distance: Annotated[float, Quantity("body heights", 0.001, 1.0)] = 0.025
 

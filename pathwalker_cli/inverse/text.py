@@ -13,7 +13,7 @@ from rich.text import Text
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.inverse.residuals import COMPONENTS, ResidualTable
 from pathwalker_cli.inverse.strengths import StrengthTable
-from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.inverse.trial import Trial
 
 
 def trials_renderable(trials: Iterable[Trial]) -> Table:
@@ -133,11 +133,13 @@ def trial_warnings(trials: Iterable[Trial], height: float, share: float) -> tupl
                 f"average (usual: below {1e3 * share * height:.0f} mm at a height of {height:g} "
                 "m): is this the patient's file, and the condition that was recorded?"
             )
+        warnings += [f"{trial.name}: {doubt}" for doubt in trial.doubts]
         for gap in trial.gaps:
             if not gap.bridged:
+                first = trial.first_frame + gap.first
                 warnings.append(
-                    f"{trial.name}: marker {gap.marker} is not seen in frames {gap.first} to "
-                    f"{gap.first + gap.frames - 1}; the others carry the fit there"
+                    f"{trial.name}: marker {gap.marker} is not seen in frames {first} to "
+                    f"{first + gap.frames - 1}; the others carry the fit there"
                 )
         if trial.markers is not None and trial.forces is None:
             warnings.append(f"{trial.name}: has no force plates, so there are no forces")
@@ -146,15 +148,21 @@ def trial_warnings(trials: Iterable[Trial], height: float, share: float) -> tupl
     return tuple(warnings)
 
 
-def stance_notes(trials: Iterable[Trial]) -> tuple[str, ...]:
-    """Return a sentence for every stance that a plate felt but that is not measured."""
-    return tuple(
-        f"{trial.name}: {item.stance.side} stance from frame {item.stance.strike} is not measured: "
-        f"{item.reason}"
-        for trial in trials
-        for item in trial.stances
-        if not item.measured and item.plate is not None
-    )
+def trial_notes(trials: Iterable[Trial]) -> tuple[str, ...]:
+    """Return sentences on how files were read, and why plates that felt a foot do not count.
+
+    Frames are numbered as the recording program shows them.
+    """
+    notes = []
+    for trial in trials:
+        notes += [f"{trial.name}: {remark}" for remark in trial.remarks]
+        notes += [
+            f"{trial.name}: {item.stance.side} stance from frame "
+            f"{trial.first_frame + item.stance.strike} is not measured: {item.reason}"
+            for item in trial.stances
+            if not item.measured and item.plate is not None
+        ]
+    return tuple(notes)
 
 
 def _measured_sides(trial: Trial) -> list[Side]:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from pathwalker_cli.conventions import Condition, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.cycles import GaitCycle, Stance, gait_cycles, stances
+from pathwalker_cli.inverse.c3d_trials import c3d_trials
+from pathwalker_cli.inverse.cycles import Stance, gait_cycles, stances
 from pathwalker_cli.inverse.dynamics import (
     MOTION_CUTOFF,
     frame_rate,
@@ -19,21 +19,13 @@ from pathwalker_cli.inverse.dynamics import (
     inverse_dynamics,
     smooth_rates,
 )
-from pathwalker_cli.inverse.forces import ground_forces
-from pathwalker_cli.inverse.kinematics import MarkerResiduals, inverse_kinematics, pelvis_markers
-from pathwalker_cli.inverse.markers import (
-    Gap,
-    bridge_gaps,
-    is_projected,
-    load_marker_set,
-    marker_points,
-    walking_plane,
-)
 from pathwalker_cli.inverse.published import AVERAGED_TRIALS, flagged_cycles, published_torques
 from pathwalker_cli.inverse.stance_checks import StanceForce
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, RecordedConfig
+from pathwalker_cli.inverse.trial import Trial
+from pathwalker_cli.inverse.walk import StandingError
 from pathwalker_cli.io.c3d import Recording
-from pathwalker_cli.io.c3d_checks import c3d_files, checked_recording, require_plates
+from pathwalker_cli.io.c3d_checks import c3d_files, require_plates
 from pathwalker_cli.io.recordings import (
     CompactRecording,
     foot_columns,
@@ -51,36 +43,6 @@ Progress = Callable[[str], None]
 """Called with "barefoot 3053179" before a trial is evaluated."""
 
 
-@dataclass(frozen=True)
-class Trial(CompactRecording):
-    """A recorded trial and what follows from it.
-
-    Args:
-        condition: "barefoot" or "orthosis".
-        cycles: Gait cycles that the study looks at.
-        tau: Residuals and joint torques, NaN where a force is not measured, or None.
-        stances: What the plates know about every stance.
-        markers: Distances of the markers from the walker, None without C3D.
-        gaps: Gaps in the marker paths.
-        published: Whether forces, torques and cycles are those of the article's own method.
-    """
-
-    condition: Condition
-    cycles: tuple[GaitCycle, ...]
-    tau: Trajectory | None = None
-    stances: tuple[StanceForce, ...] = ()
-    markers: MarkerResiduals | None = None
-    gaps: tuple[Gap, ...] = ()
-    published: bool = False
-
-    def measured(self, cycle: GaitCycle) -> bool:
-        """Return whether the force of the stance that begins a cycle is known."""
-        return self.published or any(
-            item.measured and (item.stance.side, item.stance.strike) == (cycle.side, cycle.start)
-            for item in self.stances
-        )
-
-
 def kinematics_trials(
     config: RecordedConfig, patient: Patient, progress: Progress = print
 ) -> tuple[Trial, ...]:
@@ -89,12 +51,40 @@ def kinematics_trials(
     Raises:
         DataError: If a recording cannot be used.
     """
-    trials = []
+    trials: list[Trial] = []
     for condition in config.recorded_conditions:
-        for path in c3d_files(config.c3d.of(condition)):
-            progress(f"{condition} {path.stem}")
-            trials.append(c3d_trial(path, patient, condition, config)[0])
+        trials += [trial for trial, _ in _walks(config, patient, condition, progress)]
     return tuple(trials)
+
+
+def _walks(
+    config: RecordedConfig,
+    patient: Patient,
+    condition: Condition,
+    progress: Progress,
+    wanted: Callable[[str], bool] = lambda _: True,
+) -> list[tuple[Trial, Recording]]:
+    """Return the trials of one condition; files in which nobody walks are set aside.
+
+    Raises:
+        DataError: If a recording cannot be used, or nobody walks in any.
+    """
+    found: list[tuple[Trial, Recording]] = []
+    still: list[StandingError] = []
+    for path in c3d_files(config.c3d.of(condition)):
+        if wanted(path.stem):
+            progress(f"{condition} {path.stem}")
+            try:
+                found += c3d_trials(path, patient, condition, config)
+            except StandingError as error:
+                still.append(error)
+    if still and not found:
+        raise still[0]
+    if still:
+        aside = tuple(f"{error.where} is set aside: its {error.what}" for error in still)
+        first, recording = found[0]
+        found[0] = replace(first, remarks=(*first.remarks, *aside)), recording
+    return found
 
 
 def dynamics_trials(
@@ -118,20 +108,20 @@ def _c3d_dynamics(
     config: InverseDynamicsConfig, patient: Patient, condition: Condition, progress: Progress
 ) -> list[Trial]:
     """Return the trials of one condition from C3D files."""
-    trials = []
-    files = c3d_files(config.c3d.of(condition))
     published = config.method == "published"
-    for path in files:
-        wanted = not config.trials or path.stem in config.trials
-        if not wanted or (published and path.stem not in AVERAGED_TRIALS[condition]):
-            continue
-        progress(f"{condition} {path.stem}")
-        trial, recording = c3d_trial(path, patient, condition, config)
-        require_plates(recording, path)
+
+    def wanted(name: str) -> bool:
+        ours = not published or name in AVERAGED_TRIALS[condition]
+        return ours and (not config.trials or name in config.trials)
+
+    trials = []
+    for trial, recording in _walks(config, patient, condition, progress, wanted):
+        require_plates(recording)
         if published:
             trials.append(_published(trial, recording, patient))
         else:
             trials.append(with_torques(trial, patient, config.motion_cutoff))
+    files = c3d_files(config.c3d.of(condition))
     if files and not trials and published:
         raise DataError(
             f"none of the {len(files)} {condition} files is a trial of the published tables",
@@ -139,40 +129,6 @@ def _c3d_dynamics(
             mend="use method default for other recordings",
         )
     return trials
-
-
-def c3d_trial(
-    path: Path, patient: Patient, condition: Condition, config: RecordedConfig
-) -> tuple[Trial, Recording]:
-    """Evaluate one C3D file: angles, events and, with force plates, forces, but no torques.
-
-    Returns:
-        The trial, and the recording with short gaps bridged.
-
-    Raises:
-        DataError: If the recording cannot be used.
-    """
-    points = marker_points(load_marker_set(config.markers), patient, condition)
-    names = tuple(point.marker for point in points)
-    recording = checked_recording(path, names, patient.height)
-    recording, gaps = bridge_gaps(recording, names, config.longest_gap)
-    model: pin.Model = pinocchio_model(patient, condition)
-    plane = walking_plane(recording, pelvis_markers(points))
-    motion, distances = inverse_kinematics(model, recording, points, plane)
-    in_lab = None if is_projected(recording, plane, names) else plane
-    forces = ground_forces(recording, model, motion, in_lab) if recording.plates else None
-    trial = Trial(
-        recording.name,
-        motion,
-        recording.events,
-        forces.table if forces else None,
-        condition,
-        gait_cycles(recording.events),
-        stances=forces.stances if forces else (),
-        markers=distances,
-        gaps=gaps,
-    )
-    return trial, recording
 
 
 def recorded_trials(

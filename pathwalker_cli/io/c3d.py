@@ -1,29 +1,28 @@
 """C3D recordings in: markers in metres, events, analog channels and force plates.
 
-Positions keep the axes of the laboratory; `inverse.markers` turns them into the walking plane.
+Positions keep the axes of the laboratory; `inverse.walk` turns them into the walking plane.
 """
 
 from __future__ import annotations
 
-import math
 import subprocess
 import sys
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import Side
 from pathwalker_cli.errors import DataError
-
-EventKind = Literal["foot_strike", "toe_off"]
+from pathwalker_cli.io.c3d_events import Event, continued, read_events
+from pathwalker_cli.io.c3d_plates import METRES, ForcePlate, read_plates
 
 LEAST_FRAMES: Final = 20
 """Frames that the zero-lag filter needs at the ends, and fewer than any step has."""
 
-METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
-"""Length of the units of C3D files [m]."""
+_FARTHEST: Final = 1e5
+"""Distance beyond which no laboratory reaches, even with mm taken for m [m]."""
 
 _LONGEST: Final = 60.0
 """Time to read a file [s]; a minute of walking takes less than a second."""
@@ -41,45 +40,6 @@ except MemoryError:
 _TOO_LARGE: Final = 3
 """How that process ends if they are too few."""
 
-_KINDS: Final[dict[str, EventKind]] = {"foot strike": "foot_strike", "foot off": "toe_off"}
-_SIDES: Final[dict[str, Side]] = {"left": "left", "right": "right"}
-
-
-@dataclass(frozen=True)
-class Event:
-    """A foot strike or toe-off.
-
-    Args:
-        side: "right" or "left".
-        kind: "foot_strike" or "toe_off".
-        frame: Frame of the recording, from 0.
-    """
-
-    side: Side
-    kind: EventKind
-    frame: int
-
-
-@dataclass(frozen=True)
-class ForcePlate:
-    """A Kistler plate (C3D type 3) with its eight channels.
-
-    Args:
-        name: Name for messages, "plate 1".
-        corners: Corners 1 to 4 in the laboratory [m], shape (4, 3).
-        half_length: Distance of the sensors from the centre along the plate's x (a) [m].
-        half_width: Distance of the sensors from the centre along the plate's y (b) [m].
-        depth: Depth of the sensors below the surface [m].
-        channels: x12, x34, y14, y23, z1, z2, z3, z4 [N], shape (samples, 8).
-    """
-
-    name: str
-    corners: np.ndarray
-    half_length: float
-    half_width: float
-    depth: float
-    channels: np.ndarray
-
 
 @dataclass(frozen=True)
 class Recording:
@@ -93,6 +53,10 @@ class Recording:
         events: Foot strikes and toe-offs in order of time.
         plates: Force plates.
         samples_per_frame: Analog samples per marker frame.
+        first_frame: Number that the recording program gives the first frame.
+        subjects: Whom the file names before its markers.
+        remarks: What a user should know about how the file was read, a sentence each.
+        numbers: What the file says about the subject, e.g. Bodymass, as it stands there.
     """
 
     name: str
@@ -102,6 +66,10 @@ class Recording:
     events: tuple[Event, ...]
     plates: tuple[ForcePlate, ...]
     samples_per_frame: int
+    first_frame: int = 1
+    subjects: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    numbers: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def time(self) -> np.ndarray:
@@ -124,14 +92,15 @@ class Recording:
         return self.positions[:, self.markers.index(name)]
 
 
-def read_c3d(path: str | Path) -> Recording:
+def read_c3d(path: str | Path, subject: str | None = None) -> Recording:
     """Read a recording.
 
     Args:
         path: The C3D file.
+        subject: Whose markers to read, if the file names several; all if left out.
 
     Raises:
-        DataError: If the file is missing, is not C3D, or holds units or plates that are not known.
+        DataError: If the file is missing, is not C3D, or holds units that are not known.
     """
     path = Path(path)
     content = _open(path)
@@ -139,17 +108,30 @@ def read_c3d(path: str | Path) -> Recording:
     rate = float(_value(parameters, "POINT", "RATE", path)[0])
     first_frame = int(content["header"]["points"]["first_frame"]) + 1
     points = content["data"]["points"]
+    _value(parameters, "POINT", "LABELS", path)
     # labels beyond the last point name nothing
-    labels = _value(parameters, "POINT", "LABELS", path)[: points.shape[1]]
+    labels = [str(label) for label in continued(parameters["POINT"], "LABELS")][: points.shape[1]]
+    parts = [label.rpartition(":") for label in labels]
+    subjects = tuple(dict.fromkeys(part[0].strip() for part in parts if part[1]))
+    if subject is not None and subject not in subjects:
+        what, allowed = f"names no subject {subject}", ", ".join(subjects) or "none is named"
+        raise DataError(what, where=str(path), allowed=allowed)
+    own = [i for i, part in enumerate(parts) if subject in (None, part[0].strip())]
+    unit = _unit(parameters, path)
     samples = content["data"]["analogs"].shape[2]
+    plates, remarks = read_plates(content, unit)
     return Recording(
         name=path.stem,
         rate=rate,
-        markers=tuple(str(label).rpartition(":")[2].strip() for label in labels),
-        positions=_positions(points, _unit(parameters, path)),
-        events=_events(parameters, rate, first_frame, points.shape[2]),
-        plates=_plates(content, path),
+        markers=tuple(parts[i][2].strip() for i in own),
+        positions=_positions(points[:, own], unit),
+        events=read_events(parameters.get("EVENT", {}), rate, first_frame, points.shape[2]),
+        plates=plates,
         samples_per_frame=samples // points.shape[2] if points.shape[2] else 0,
+        first_frame=first_frame,
+        subjects=subjects,
+        remarks=remarks,
+        numbers=_numbers(parameters),
     )
 
 
@@ -212,86 +194,24 @@ def _unit(parameters: Any, path: Path) -> float:
 
 
 def _positions(points: np.ndarray, unit: float) -> np.ndarray:
-    """Return positions [m], shape (n, m, 3); a point at exactly zero was not seen."""
+    """Return positions [m], shape (n, m, 3); a point at exactly zero or far away was not seen."""
     positions = np.moveaxis(points[:3], (0, 1, 2), (2, 1, 0)) * unit
-    missing = ~np.isfinite(positions).all(axis=2) | (positions == 0.0).all(axis=2)
+    seen = (np.abs(positions) < _FARTHEST).all(axis=2)  # NaN is not
+    missing = ~seen | (positions == 0.0).all(axis=2)
     positions[missing] = np.nan
     positions.setflags(write=False)
     return positions
 
 
-def _events(parameters: Any, rate: float, first_frame: int, frames: int) -> tuple[Event, ...]:
-    """Return strikes and toe-offs inside the recording; other events are left out.
-
-    C3D counts event times from frame 1 at time zero; an event between two frames counts for the
-    later one.  In the shipped recordings the plates' forces rise and fall within one frame of the
-    events read this way.
-    """
-    group = parameters.get("EVENT", {})
-    if "TIMES" not in group or not np.size(group["TIMES"]["value"]):
-        return ()
-    minutes, seconds = group["TIMES"]["value"]
-    events = []
-    for side, kind, time in zip(
-        group["CONTEXTS"]["value"],
-        group["LABELS"]["value"],
-        60.0 * minutes + seconds,
-        strict=False,
-    ):
-        key_side, key_kind = str(side).strip().lower(), str(kind).strip().lower()
-        frame = math.ceil(round(float(time) * rate, 3)) - (first_frame - 1)
-        if key_side in _SIDES and key_kind in _KINDS and 0 <= frame < frames:
-            events.append(Event(_SIDES[key_side], _KINDS[key_kind], frame))
-    return tuple(sorted(events, key=lambda event: event.frame))
-
-
-def analog_offset_error(offset: np.ndarray, scale: np.ndarray, unsigned: bool) -> np.ndarray:
-    """Return what ezc3d adds to every channel by misreading ANALOG:OFFSET, shape of `offset`.
-
-    The parameter is a 16-bit word.  In a file of unsigned samples, an offset above 32767 reads as
-    a negative number; ezc3d 1.7 then takes its absolute value instead of adding 65536.
-
-    Args:
-        offset: ANALOG:OFFSET as read [counts].
-        scale: Physical units per count.
-        unsigned: Whether ANALOG:FORMAT is UNSIGNED.
-    """
-    true = np.mod(offset, 65536) if unsigned else offset
-    return (true - np.abs(offset)) * scale
-
-
-def _analog(content: Any) -> np.ndarray:
-    """Return the analog channels in physical units, shape (samples, channels)."""
-    group = content["parameters"]["ANALOG"]
-    channels = np.array(content["data"]["analogs"][0].T, dtype=float)
-    used = channels.shape[1]
-    offset = np.asarray(group["OFFSET"]["value"], dtype=float)[:used]
-    scale = np.asarray(group["SCALE"]["value"], dtype=float)[:used]
-    general = float(group["GEN_SCALE"]["value"][0])
-    form = group["FORMAT"]["value"] if "FORMAT" in group else []
-    unsigned = bool(form) and str(form[0]).strip().upper() == "UNSIGNED"
-    return channels - analog_offset_error(offset, scale * general, unsigned)
-
-
-def _plates(content: Any, path: Path) -> tuple[ForcePlate, ...]:
-    """Return the force plates; only Kistler plates of type 3 are read."""
-    parameters = content["parameters"]
-    group = parameters.get("FORCE_PLATFORM", {})
-    count = int(group["USED"]["value"][0]) if "USED" in group and len(group["USED"]["value"]) else 0
-    if not count or not content["data"]["analogs"].size:
-        return ()
-    unit = _unit(parameters, path)
-    analog = _analog(content)
-    plates = []
-    for index in range(count):
-        kind = int(group["TYPE"]["value"][index])
-        name = f"plate {index + 1}"
-        if kind != 3:
-            raise DataError(
-                f"{name} is of type {kind}", where=str(path), allowed="type 3 (Kistler)"
-            )
-        a, b, depth = np.abs(group["ORIGIN"]["value"][:, index]) * unit
-        columns = group["CHANNEL"]["value"][:8, index].astype(int) - 1
-        corners = group["CORNERS"]["value"][:, :, index].T * unit
-        plates.append(ForcePlate(name, corners, a, b, depth, analog[:, columns]))
-    return tuple(plates)
+def _numbers(parameters: Any) -> dict[str, float]:
+    """Return the numbers of the group that processing programs keep about the subject."""
+    values = {
+        name: np.ravel(content["value"])
+        for name, content in parameters.get("PROCESSING", {}).items()
+        if name != "__METADATA__"
+    }
+    return {
+        name: float(value[0])
+        for name, value in values.items()
+        if value.size == 1 and np.issubdtype(value.dtype, np.number) and np.isfinite(value[0])
+    }

@@ -53,40 +53,46 @@ def c3d_files(paths: Sequence[str | Path]) -> tuple[Path, ...]:
     return unique
 
 
-def checked_recording(path: Path, markers: Sequence[str], height: float) -> Recording:
-    """Read a recording and check that it can be evaluated.
+def readable_recording(path: Path, subject: str | None = None) -> Recording:
+    """Read a recording and check that it is a motion.
 
     Args:
         path: The C3D file.
-        markers: Names of the markers that are needed.
-        height: Height of the patient [m].
+        subject: Whose markers to read, if the file names several.
 
     Raises:
-        DataError: If the file is damaged, or lacks frames, markers or events.
+        DataError: If the file is damaged, or lacks frames.
     """
     try:
-        recording = read_c3d(path)
+        recording = read_c3d(path, subject)
     except (ValueError, LookupError, ArithmeticError, TypeError, MemoryError) as problem:
         raise DataError(
             f"is damaged: {problem}", where=str(path), mend="export the recording again"
         ) from None
-    markers = tuple(dict.fromkeys(markers))
     _check_length(path)
     _check_frames(recording, path)
-    _check_markers(recording, markers, path)
-    _check_unit(recording, markers, height, path)
-    _check_signals(recording, path)
-    if not any(event.kind == "foot_strike" for event in recording.events):
-        raise DataError(
-            "has no foot strike events",
-            where=str(path),
-            allowed="EVENT labels 'Foot Strike' and 'Foot Off' with contexts 'Left' and 'Right'",
-            mend="mark them in the motion capture software and export again",
-        )
     return recording
 
 
-def require_plates(recording: Recording, path: Path) -> None:
+def check_markers(recording: Recording, names: Sequence[str], height: float, path: Path) -> None:
+    """Refuse a recording that lacks markers, or whose markers and plates cannot be right.
+
+    Args:
+        recording: The recording.
+        names: Names of the markers that are needed.
+        height: Height of the patient [m].
+        path: Its file.
+
+    Raises:
+        DataError: If so.
+    """
+    names = tuple(dict.fromkeys(names))
+    _check_markers(recording, names, path)
+    _check_unit(recording, names, height, path)
+    _check_signals(recording, path)
+
+
+def require_plates(recording: Recording) -> None:
     """Refuse a recording without force plates.
 
     Raises:
@@ -94,9 +100,9 @@ def require_plates(recording: Recording, path: Path) -> None:
     """
     if not recording.plates:
         raise DataError(
-            "has no force plates",
-            where=str(path),
-            allowed="Kistler plates (type 3) with eight channels each",
+            "has no force plates that can be read",
+            where=recording.name,
+            allowed="plates of types 1 to 5 and 7 with their channels",
             mend="use ik for joint angles alone, or export the analog channels too",
         )
 
@@ -154,6 +160,19 @@ def _check_markers(recording: Recording, markers: Sequence[str], path: Path) -> 
             allowed=_some(recording.markers),
             mend=mend,
         )
+    twice = [name for name in markers if recording.markers.count(name) > 1]
+    if twice:
+        several = len(recording.subjects) > 1
+        raise DataError(
+            f"has {recording.markers.count(twice[0])} markers {', '.join(twice)}",
+            where=str(path),
+            allowed=f"one subject of {', '.join(recording.subjects)}"
+            if several
+            else "one of a name",
+            mend="name the subject (--subject)"
+            if several
+            else "take the wrong one out of the file",
+        )
     unseen = [n for n in markers if not np.isfinite(recording.marker(n)).any()]
     if unseen:
         raise DataError(
@@ -165,19 +184,17 @@ def _check_markers(recording: Recording, markers: Sequence[str], path: Path) -> 
 
 def _check_unit(recording: Recording, markers: Sequence[str], height: float, path: Path) -> None:
     """Refuse a recording whose lengths cannot be in the unit that it names."""
-    up = np.stack([recording.marker(name)[:, 2] for name in markers], axis=1)
-    frames = np.isfinite(up).any(axis=1)
-    span = float(np.median(np.nanmax(up[frames], axis=1) - np.nanmin(up[frames], axis=1)))
+    every = np.stack([recording.marker(name) for name in markers], axis=1)
+    seen = every[np.isfinite(every[..., 0]).any(axis=1)]
+    # whichever axis is the vertical: a body is longer than its step
+    span = float(np.median(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1), axis=0).max())
     if not SPAN[0] * height < span < SPAN[1] * height:
-        mend = "POINT:UNITS must name the unit of the positions: mm and m confused?"
-        if span < 1e-9:
-            mend = "the vertical must be z"
         raise DataError(
-            f"its markers span {span:.4g} m from the lowest to the highest",
+            f"its markers span {span:.4g} m from end to end",
             where=str(path),
             allowed=f"{SPAN[0] * height:.2g} to {SPAN[1] * height:.2g} m at a body height of "
             f"{height:g} m",
-            mend=mend,
+            mend="POINT:UNITS must name the unit of the positions: mm and m confused?",
         )
 
 
@@ -185,14 +202,14 @@ def _check_signals(recording: Recording, path: Path) -> None:
     """Refuse a recording whose force plates have no extent or hold something else than numbers."""
     for plate in recording.plates:
         sides = np.diff(plate.corners, axis=0)[:2]
-        if not (np.linalg.norm(np.cross(*sides)) > 0.0 and plate.half_length * plate.half_width):
+        if not np.linalg.norm(np.cross(*sides)) > 0.0:
             raise DataError(
                 f"{plate.name} has no extent",
                 where=str(path),
-                allowed="four corners, and distances of the sensors from the centre",
-                mend="set FORCE_PLATFORM:CORNERS and ORIGIN and export again",
+                allowed="four corners",
+                mend="set FORCE_PLATFORM:CORNERS and export again",
             )
-        bad = np.flatnonzero(~np.isfinite(plate.channels).all(axis=1))
+        bad = np.flatnonzero(~np.isfinite([plate.force, plate.moment]).all(axis=(0, 2)))
         if bad.size:
             raise DataError(
                 f"{plate.name} holds NaN or infinity in {bad.size} samples, first in {bad[0]}",

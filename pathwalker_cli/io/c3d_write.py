@@ -8,12 +8,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.io.c3d import METRES, Event, EventKind, ForcePlate, Recording
+from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.io.c3d_events import Event, EventKind
+from pathwalker_cli.io.c3d_plates import METRES, ForcePlate, plate_axes
 
 _LABELS: Final[dict[EventKind, str]] = {"foot_strike": "Foot Strike", "toe_off": "Foot Off"}
 
-_KISTLER: Final = 3
-"""The only type of force plate that is read."""
+_SIX_COMPONENTS: Final = 2
+"""Type of the plates that are written: three forces, three moments."""
 
 
 def write_c3d(path: Path, recording: Recording, unit: str = "mm", description: str = "") -> None:
@@ -54,19 +56,23 @@ def _add_events(file: Any, events: Sequence[Event], rate: float) -> None:
 
 
 def _add_plates(file: Any, plates: Sequence[ForcePlate], rate: float, unit: str) -> None:
-    """Add force plates and their analog channels [N]."""
-    channels = np.concatenate([plate.channels for plate in plates], axis=1).T
+    """Add force plates and their channels: forces [N] and moments [N times the file's unit]."""
+    channels = np.concatenate(
+        [values @ plate_axes(plate.corners).T / scale
+         for plate in plates
+         for values, scale in ((plate.force, 1.0), (plate.moment, METRES[unit]))],
+        axis=1,
+    ).T  # fmt: skip
     analog = file["parameters"]["ANALOG"]
     analog["RATE"]["value"] = [rate]
     analog["LABELS"]["value"] = [f"F{i}" for i in range(len(channels))]
-    analog["UNITS"]["value"] = ["N"] * len(channels)
+    analog["UNITS"]["value"] = [*["N"] * 3, *[f"N{unit}"] * 3] * len(plates)
     file["data"]["analogs"] = channels[None]
-    sizes = [[plate.half_length, plate.half_width, plate.depth] for plate in plates]
     corners = np.stack([plate.corners.T for plate in plates], axis=2)
     group = "FORCE_PLATFORM"
     file.add_parameter(group, "USED", [len(plates)])
-    file.add_parameter(group, "TYPE", [_KISTLER] * len(plates))
-    file.add_parameter(group, "ORIGIN", np.array(sizes).T / METRES[unit])
+    file.add_parameter(group, "TYPE", [_SIX_COMPONENTS] * len(plates))
+    file.add_parameter(group, "ORIGIN", np.zeros((3, len(plates))))
     file.add_parameter(group, "CORNERS", corners / METRES[unit])
     numbers = np.arange(1.0, len(channels) + 1.0).reshape(len(plates), -1)
     file.add_parameter(group, "CHANNEL", numbers.T)

@@ -16,7 +16,8 @@ from pathwalker_cli.conventions import (
     coordinate_unit,
 )
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.io.c3d import LEAST_FRAMES, Event
+from pathwalker_cli.io.c3d import LEAST_FRAMES
+from pathwalker_cli.io.c3d_events import Event
 from pathwalker_cli.io.csv_file import read_cells, write_table
 from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.patient import Patient

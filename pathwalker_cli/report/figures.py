@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from pathwalker_cli.evaluation.curves import Trace, known_curves, traces
 from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_handles
 from pathwalker_cli.inverse.figures import joint_torque_figure, name_figure
-from pathwalker_cli.inverse.trials import Trial
+from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.stride.figures.curves import ACTIVATIONS, ANGLES, FORCES, MOMENTS, CycleCurve

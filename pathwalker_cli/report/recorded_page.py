@@ -10,7 +10,8 @@ from typing import Any, Final
 from pathwalker_cli.conventions import CONDITIONS, SIDES, SUFFIX, Condition
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.files import ORIGIN
-from pathwalker_cli.inverse.trials import Trial, read_trials
+from pathwalker_cli.inverse.trial import Trial
+from pathwalker_cli.inverse.trials import read_trials
 from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table

@@ -7,8 +7,9 @@ References:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
 
 from pathwalker_cli.errors import PatientError
 from pathwalker_cli.patient import JENSEN_AGES
@@ -33,22 +34,32 @@ that table 1 of Sreenivasa et al. (2017) shows."""
 
 @dataclass(frozen=True)
 class Child:
-    """A made-up child.
+    """A made-up child, or one as far as a recording tells.
 
     Args:
         id: Its id.
         age: Age [years].
         body_mass: Body mass [kg].
         height: Height [m].
+        sex: "female" or "male".
+        lengths: Lengths that were measured, right and left [m].
+        soles: Per side, heel and toe of the bare foot that were measured, from the ankle [m].
+        sources: Where the numbers come from; none of a made-up child.
     """
 
     id: str
     age: float
     body_mass: float
     height: float
+    sex: str = "female"
+    lengths: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    soles: Mapping[str, Mapping[str, tuple[float, float]]] = field(default_factory=dict)
+    sources: tuple[str, ...] = ()
 
     def length(self, name: str) -> float:
-        """Return the length of a limb [m] in the proportions of the shipped healthy child."""
+        """Return the length of a limb [m], else in the proportions of the shipped healthy child."""
+        if name in self.lengths:
+            return sum(self.lengths[name]) / 2.0
         patient = healthy_child()
         return round(patient.length(name, "right") * self.height / patient.height, 3)
 
@@ -62,7 +73,11 @@ class Child:
 
 
 def made_child(
-    id_: str, age: float | None = None, mass: float | None = None, height: float | None = None
+    id_: str,
+    age: float | None = None,
+    mass: float | None = None,
+    height: float | None = None,
+    **measured: Any,
 ) -> Child:
     """Return a made-up child; body mass and height follow from the age if they are not given.
 
@@ -71,6 +86,7 @@ def made_child(
         age: Age [years].
         mass: Body mass [kg].
         height: Height [m].
+        **measured: Further fields of `Child`.
 
     Raises:
         PatientError: If the regressions of the segment masses do not hold for the age.
@@ -83,4 +99,4 @@ def made_child(
     usual = 2.0 * age + 8.0 if age < 7.0 else (7.0 * age - 5.0) / 2.0
     mass = round(usual, 1) if mass is None else mass
     height = round(0.06 * age + 0.77, 2) if height is None else height
-    return Child(id_, age, mass, height)
+    return Child(id_, age, mass, height, **measured)

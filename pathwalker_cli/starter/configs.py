@@ -107,17 +107,19 @@ class ConfigFile:
         return commented(entry.parents[-1], value, entry.comment, depth, given=not idle)
 
 
-def config_files(with_orthosis: bool) -> tuple[ConfigFile, ...]:
+def config_files(with_orthosis: bool, worn: bool) -> tuple[ConfigFile, ...]:
     """Return the configs of a new folder; C3D files are expected in c3d/.
 
     Args:
         with_orthosis: Whether there is an orthosis.
+        worn: Whether walks with it are recorded.
     """
     patient = {"patient": "patient.yaml"}
     recorded = {**patient, "conditions": "[barefoot]", "c3d.barefoot": "[c3d/barefoot]"}
     base, studies = {"base": "mapd-barefoot.yaml", "check": "[strengths]"}, _STUDIES
-    if with_orthosis:
+    if worn:
         recorded |= {"conditions": "[barefoot, orthosis]", "c3d.orthosis": "[c3d/orthosis]"}
+    if with_orthosis:
         base, studies = {"base": "mapd-orthosis.yaml"}, {**_SPRING_STUDIES, **_STUDIES}
     problems = _PROBLEMS if with_orthosis else _PROBLEMS[:1]
     return (

@@ -23,7 +23,9 @@ from pathwalker_cli.inverse.forces import foot_extents, foot_points
 from pathwalker_cli.inverse.kinematics import marker_paths
 from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set, marker_points
 from pathwalker_cli.inverse.trials import recorded_stances
-from pathwalker_cli.io.c3d import Event, ForcePlate, Recording
+from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.io.c3d_events import Event
+from pathwalker_cli.io.c3d_plates import ForcePlate
 from pathwalker_cli.io.c3d_write import write_c3d
 from pathwalker_cli.io.recordings import CompactRecording, read_recording, recording_names
 from pathwalker_cli.model.urdf import pinocchio_model
@@ -47,9 +49,6 @@ _ASIDE: Final[Mapping[str, float]] = {"r": -0.09, "l": 0.09}
 
 _PLATE: Final = (0.5, 0.16)
 """Length and width of a force plate [m]; narrow, so that each carries one foot only."""
-
-_SENSORS: Final = (0.2, 0.06, 0.03)
-"""Distance of its sensors from the centre along and across, and their depth [m]."""
 
 
 @dataclass(frozen=True)
@@ -175,34 +174,11 @@ def _plate(number: int, stance: Stance, played: _Played, child: _Body, other: _B
     aside = _ASIDE[stance.side[0]]
     ends = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
     corners = np.array([[middle + x * along / 2, aside + y * across / 2, 0.0] for x, y in ends])
-    places = np.column_stack([point - middle, np.zeros_like(point)])
-    channels = plate_channels(force, places, *_SENSORS)
     at = np.arange(len(force) * _PER_FRAME) / _PER_FRAME
-    samples = np.column_stack([np.interp(at, np.arange(len(force)), c) for c in channels.T])
-    return ForcePlate(f"plate {number}", corners, *_SENSORS, samples)
-
-
-def plate_channels(
-    force: np.ndarray, point: np.ndarray, half_length: float, half_width: float, depth: float
-) -> np.ndarray:
-    """Return the channels of a plate that carries a force at a point: `plate_load` turned round.
-
-    Args:
-        force: Force on the body in the plate's axes [N], shape (samples, 3).
-        point: Where it acts on the surface, from the centre along the plate's x and y [m],
-            shape (samples, 2).
-        half_length: Distance of the sensors from the centre along x [m].
-        half_width: Distance of the sensors from the centre along y [m].
-        depth: Depth of the sensors below the surface [m].
-
-    Returns:
-        x12, x34, y14, y23, z1, z2, z3, z4 [N], shape (samples, 8), without moment about z.
-    """
-    fx, fy, fz = force.T
-    x, y = point.T
-    across, along = (y * fz + depth * fy) / half_width, -(x * fz + depth * fx) / half_length
-    corners = [fz + across - along, fz + across + along, fz - across + along, fz - across - along]
-    return np.stack([fx / 2, fx / 2, fy / 2, fy / 2, *(z / 4 for z in corners)], axis=1)
+    samples = np.column_stack([np.interp(at, np.arange(len(force)), c) for c in force.T])
+    arm = np.interp(at, np.arange(len(force)), point - middle)
+    moment = np.cross(np.outer(arm, [1.0, 0.0, 0.0]), samples)
+    return ForcePlate(f"plate {number}", corners, samples, moment)
 
 
 def _load(

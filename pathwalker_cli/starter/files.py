@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+import shutil
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -61,26 +62,31 @@ class Step:
     commands: tuple[str, ...] = ()
 
 
-def folder_files(child: Child, with_orthosis: bool, example: bool) -> dict[str, str]:
+def folder_files(
+    child: Child, with_orthosis: bool, example: bool, walks: bool = False
+) -> dict[str, str]:
     """Return the texts of a new folder by file name.
 
     Args:
         child: The child.
         with_orthosis: Whether there is an orthosis.
-        example: Whether recordings come with it.
+        example: Whether made recordings come with it.
+        walks: Whether recorded barefoot walks come with it.
     """
     files = {"patient.yaml": _patient(child, with_orthosis, {})}
     purposes = {"patient.yaml": "the child: begin here"}
     if with_orthosis:
         files["orthosis.yaml"] = _orthosis({})
         purposes["orthosis.yaml"] = "the orthosis and its springs"
-    for file in config_files(with_orthosis):
+    for file in config_files(with_orthosis, with_orthosis and not walks):
         files[file.name] = _environment().get_template("config.yaml.j2").render(file=file)
         purposes[file.name] = file.purpose[0].lower() + file.purpose[1:].split(". ")[0].rstrip(".")
     if example:
         purposes["c3d/"] = "made recordings"
     readme = _environment().get_template("README.txt.j2")
-    steps = next_steps(with_orthosis, example)
+    if walks:
+        purposes["c3d/"] = "recordings"
+    steps = next_steps(with_orthosis, example, walks)
     shown = {
         name: textwrap.fill(text, WIDTH - 26).replace("\n", "\n" + " " * 26)
         for name, text in purposes.items()
@@ -91,18 +97,19 @@ def folder_files(child: Child, with_orthosis: bool, example: bool) -> dict[str, 
     return files
 
 
-def next_steps(with_orthosis: bool, example: bool) -> tuple[Step, ...]:
+def next_steps(with_orthosis: bool, example: bool, walks: bool = False) -> tuple[Step, ...]:
     """Return what to do with a new folder, one command after the other.
 
     Args:
         with_orthosis: Whether there is an orthosis.
-        example: Whether recordings come with it.
+        example: Whether made recordings come with it.
+        walks: Whether recorded barefoot walks come with it.
     """
     conditions = ("barefoot", "orthosis") if with_orthosis else ("barefoot",)
     problems = [f"mapd-{condition}" for condition in conditions]
     imports = tuple(
         f"pathwalker import c3d/{c} --patient . --condition {c} -o recordings/{c}"
-        for c in conditions
+        for c in (conditions[:1] if walks else conditions)
     )
     recorded: tuple[Step, ...] = (
         Step("Turn the C3D files into joint angles, events and forces.", imports),
@@ -113,7 +120,7 @@ def next_steps(with_orthosis: bool, example: bool) -> tuple[Step, ...]:
         ),
     )
     fill_in = "Fill in patient.yaml" + (" and orthosis.yaml." if with_orthosis else ".")
-    if not example:
+    if not example and not walks:
         c3d = "With C3D recordings: put them into c3d/barefoot"
         c3d += " and c3d/orthosis" if with_orthosis else ""
         recorded = _begun(recorded, f"{c3d}. Without any, go on with step 5.")
@@ -164,7 +171,6 @@ def explained_keys() -> dict[str, dict[str, str]]:
 
 def _patient(child: Child, with_orthosis: bool, explained: dict[str, str]) -> str:
     """Return the text of the patient's file; take note of what is said of each key."""
-    lengths = ("thigh", "shank", "foot")
     foot = child.length("foot")
 
     def point(name: str) -> str:
@@ -177,9 +183,13 @@ def _patient(child: Child, with_orthosis: bool, explained: dict[str, str]) -> st
         lengths=_LENGTHS,
         entry=partial(_entry, Patient, explained),
         num=lambda value: f"{value:g}",
-        sides=lambda name: _sides((child.length(name),) * 2) if name in lengths else "",
+        sides=lambda name: _sides(child.lengths.get(name, (child.length(name),) * 2)),
         length=lambda name: f"{default_length(name, child.height):g}",
-        point=point,
+        bare="{{heel: {}, toe: {}}}".format(point("heel"), point("toe")),
+        soles={
+            side: ", ".join(f"{name}: {_pair(*at)}" for name, at in ends.items())
+            for side, ends in child.soles.items()
+        },
         sole=lambda name: _pair(*(share * child.height for share in _SOLE[name])),
         strength=lambda name: _sides(child.strength(name)),
     )  # fmt: skip
@@ -257,7 +267,9 @@ def check_new(folder: Path) -> None:
         )
 
 
-def write_folder(folder: Path, child: Child, with_orthosis: bool, example: bool) -> None:
+def write_folder(
+    folder: Path, child: Child, with_orthosis: bool, example: bool, walks: Sequence[Path] = ()
+) -> None:
     """Write a new folder for a child.
 
     Args:
@@ -265,6 +277,7 @@ def write_folder(folder: Path, child: Child, with_orthosis: bool, example: bool)
         child: The made-up child to begin with.
         with_orthosis: Whether there is an orthosis.
         example: Whether to make C3D files of the child.
+        walks: C3D files of barefoot walks to copy into it.
 
     Raises:
         DataError: If the folder is not empty or cannot be written.
@@ -272,8 +285,12 @@ def write_folder(folder: Path, child: Child, with_orthosis: bool, example: bool)
     """
     check_new(folder)
     with staged_folder(folder) as staging:
-        for name, text in folder_files(child, with_orthosis, example).items():
+        for name, text in folder_files(child, with_orthosis, example, bool(walks)).items():
             (staging / name).write_text(text, encoding="utf-8")
+        for walk in walks:
+            place = staging / "c3d" / "barefoot"
+            place.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(walk, place / walk.name)
         try:
             patient = load_patient(staging)
         except PatientError as error:

@@ -1,0 +1,226 @@
+"""The body of a person from one recording: a pose or a walk, and what the file says of them.
+
+References:
+    Davis et al. (1991): hip joint centres, as in `marker_sets`.
+    Gordon et al. (1989), Anthropometric Survey of US Army Personnel: height of the seventh cervical
+    vertebra, 0.865 of the standing height.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pathwalker_cli.conventions import GRAVITY, SIDES, Side
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.marker_sets import (
+    KnownSet,
+    foot_places,
+    hip_centre,
+    recognised,
+    set_points,
+)
+from pathwalker_cli.inverse.walk import about_vertical, turned, upright
+from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.io.c3d_checks import check_markers, readable_recording
+from pathwalker_cli.patient.proportions import ANKLE_HEIGHT
+
+_MASS: Final = ("bodymass", "mass", "weight")
+_HEIGHT: Final = ("height", "bodyheight")
+_CERVICAL: Final = 0.865
+_HEIGHTS: Final = (0.5, 2.2)
+"""Standing heights that are read as such [m]; a file may hold them in mm or cm."""
+_CHILD: Final = 1.4
+"""Height by which units are judged as long as nothing is known [m]; they are off by 10 or 1000."""
+_WIDTHS: Final = (0.08, 0.45)
+"""Distances of the front spines that can be [m]."""
+_ANKLES: Final = (0.02, 0.13)
+"""Heights of an ankle marker over the floor that can be [m]; otherwise z = 0 is not the floor."""
+
+Sole = Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a recording tells of a person.
+
+    Args:
+        mass: Body mass [kg], None if it is not known.
+        height: Standing height [m], None if it is not known.
+        lengths: Thigh, shank and foot (heel to toe marker), right and left [m].
+        soles: Per side, heel and toe [forward, up] of the ankle, on the ground [m].
+        sources: Where each number comes from, a line each.
+    """
+
+    mass: float | None
+    height: float | None
+    lengths: Mapping[str, tuple[float, float]]
+    soles: Mapping[Side, Sole]
+    sources: tuple[str, ...]
+
+
+def measured_body(
+    path: Path, mass: float | None = None, height: float | None = None, subject: str | None = None
+) -> Body:
+    """Return what a recording tells of a person.
+
+    Args:
+        path: A C3D file with a marker set that is recognised: a pose, else a walk.
+        mass: Body mass [kg], if it is known better.
+        height: Standing height [m], if it is known better.
+        subject: Whose markers, if the file names several.
+
+    Raises:
+        DataError: If the file cannot be read, or its markers are not known.
+    """
+    recording = readable_recording(path, subject)
+    known = recognised(recording, str(path))
+    if known is None:
+        raise DataError(
+            "lacks a marker on one of the front spines of the pelvis",
+            where=str(path),
+            allowed="LASI and RASI, or their names in other marker sets",
+            mend="use init without --from and measure lengths by tape",
+        )
+    check_markers(recording, [*known.markers.values()], height or _CHILD, path)
+    recording = _facing(recording, known)
+    sources: list[str] = []
+    mass = _told(recording, _MASS, mass, "body mass", sources)
+    if mass is None:
+        mass = _weighed(recording, sources)
+    height = _told(recording, _HEIGHT, height, "height", sources)
+    if height is None:
+        height = _from_neck(recording, known, sources)
+    lengths = _lengths(recording, known)
+    name = recording.name
+    sources += [
+        f"thigh, shank: {name}, hip joint centres by Davis et al. (1991)",
+        f"foot, contact points: {name}, markers around the ankle of a flat foot",
+    ]
+    return Body(mass, height, lengths, _soles(recording, known, height), tuple(sources))
+
+
+def _facing(recording: Recording, known: KnownSet) -> Recording:
+    """Return a recording with z up and x to where the pelvis faces."""
+    front, back = known.middle("asis", recording), known.middle("psis", recording)
+    if not np.isfinite(front - back).any():
+        raise DataError("never shows the whole pelvis", where=recording.name)
+    recording = upright(recording, set_points(known))
+    ahead = known.middle("asis", recording) - known.middle("psis", recording)
+    return turned(recording, about_vertical(np.nanmean(ahead, axis=0)[:2]))
+
+
+def _told(
+    recording: Recording,
+    names: tuple[str, ...],
+    value: float | None,
+    what: str,
+    sources: list[str],
+) -> float | None:
+    """Return a number that was given, else the one of the file; note where it comes from."""
+    if value is not None:
+        sources.append(f"{what}: as given")
+        return value
+    for name, number in recording.numbers.items():
+        if name.lower().replace(" ", "").replace("_", "") in names and number > 0.0:
+            sources.append(f"{what}: PROCESSING:{name} of {recording.name}")
+            if what != "height":
+                return number
+            scales = (s for s in (1.0, 0.01, 0.001) if _HEIGHTS[0] <= s * number <= _HEIGHTS[1])
+            return next((round(s * number, 3) for s in scales), None)
+    return None
+
+
+def _weighed(recording: Recording, sources: list[str]) -> float | None:
+    """Return the mass that the plates carry in a pose, None if nobody stands on them [kg]."""
+    if not recording.plates:
+        return None
+    up = np.abs(np.sum([plate.force[:, 2] for plate in recording.plates], axis=0))
+    mean, spread = float(np.median(up)), float(np.std(up))
+    if mean < 5.0 * GRAVITY or spread > 0.05 * mean:
+        return None
+    sources.append(f"body mass: what the plates carry in {recording.name}")
+    return round(mean / GRAVITY, 1)
+
+
+def _from_neck(recording: Recording, known: KnownSet, sources: list[str]) -> float | None:
+    """Return the height that belongs to that of the seventh cervical vertebra, None without [m]."""
+    marker = known.markers.get(("c7", "right"))
+    if marker is None:
+        return None
+    height = float(np.nanmax(recording.marker(marker)[:, 2])) / _CERVICAL
+    if not _HEIGHTS[0] <= height <= _HEIGHTS[1]:
+        return None
+    sources.append(
+        f"height: {marker} of {recording.name}, 0.865 of the height (Gordon et al. 1989)"
+    )
+    return round(height, 3)
+
+
+def _lengths(recording: Recording, known: KnownSet) -> dict[str, tuple[float, float]]:
+    """Return the lengths of both sides [m], medians over the frames."""
+    front, back = known.middle("asis", recording), known.middle("psis", recording)
+    spines = [recording.marker(known.markers["asis", side]) for side in SIDES]
+    ahead = _unit(front - back)
+    left = spines[1] - spines[0]
+    left = left - (left * ahead).sum(axis=1, keepdims=True) * ahead
+    width = _apart(left, np.zeros(3))
+    if not _WIDTHS[0] <= width <= _WIDTHS[1]:
+        raise DataError(
+            f"has front spines of the pelvis {width:.2f} m apart",
+            where=recording.name,
+            allowed=f"{_WIDTHS[0]} to {_WIDTHS[1]} m",
+            mend="check the pelvis' markers; those laid into a plane tell no lengths",
+        )
+    left = _unit(left)
+    up = np.cross(ahead, left)
+    every: dict[str, list[float]] = {"thigh": [], "shank": [], "foot": []}
+    for side, spine, sign in zip(SIDES, spines, (-1.0, 1.0), strict=True):
+        knee = recording.marker(known.markers["knee", side])
+        ankle = recording.marker(known.markers["ankle", side])
+        leg = _apart(spine, knee) + _apart(knee, ankle)
+        behind, aside, below = hip_centre(leg, width)
+        hip = front - behind * ahead + sign * aside * left - below * up
+        toe = recording.marker(known.markers["toe", side])
+        heel = known.markers.get(("heel", side))
+        every["thigh"].append(_apart(hip, knee))
+        every["shank"].append(_apart(knee, ankle))
+        # without a heel marker: the share of the model's foot that lies before the ankle
+        every["foot"].append(
+            _apart(recording.marker(heel), toe) if heel else _apart(ankle, toe) / 0.78
+        )
+    lost = [name for name, values in every.items() if not np.isfinite(values).all()]
+    if lost:
+        raise DataError(f"never shows both ends of the {lost[0]} at once", where=recording.name)
+    return {name: (values[0], values[1]) for name, values in every.items()}
+
+
+def _soles(
+    recording: Recording, known: KnownSet, height: float | None
+) -> dict[Side, dict[str, tuple[float, float]]]:
+    """Return where heel and toe of both feet touch the ground, from the ankle [m]."""
+    places = foot_places(known, recording)
+    soles: dict[Side, dict[str, tuple[float, float]]] = {}
+    for side in SIDES:
+        ankle = float(np.nanquantile(recording.marker(known.markers["ankle", side])[:, 2], 0.1))
+        if not _ANKLES[0] <= ankle <= _ANKLES[1]:
+            ankle = ANKLE_HEIGHT * height if height else _ANKLES[0] * 3.0
+        toe = places["toe", side][0]
+        heel = places.get(("heel", side), (-0.28 * toe, 0.0))[0]
+        soles[side] = {"heel": (round(heel, 3), -round(ankle, 3)),
+                       "toe": (round(toe, 3), -round(ankle, 3))}  # fmt: skip
+    return soles
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the median distance of two paths (n, 3) [m], to the millimetre."""
+    return round(float(np.nanmedian(np.linalg.norm(one - other, axis=1))), 3)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (n, 3) of length one."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))

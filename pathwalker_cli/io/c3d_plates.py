@@ -1,0 +1,195 @@
+"""Force plates of a C3D file: force and moment from the channels of every common type.
+
+The formulas are those of ezc3d's own reader, which refuses too much of what laboratories write
+(counts stored as floats, one unknown plate among known ones) and reads unsigned offsets wrongly.
+
+References:
+    The C3D file format, user guide (Motion Lab Systems): FORCE_PLATFORM, types 1 to 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.c3d_events import continued
+
+METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+"""Length of the units of C3D files [m]."""
+
+_CHANNELS: Final = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 7: 8}
+"""Channels of the types that are read."""
+
+_CALIBRATED: Final = {4: (6, 6), 5: (6, 8), 7: (8, 8)}
+"""Shape of the matrix that the channels of a type are multiplied with."""
+
+
+@dataclass(frozen=True)
+class ForcePlate:
+    """A force plate and what it measured.
+
+    Args:
+        name: Name for messages, "plate 1".
+        corners: Corners 1 to 4 in the laboratory [m], shape (4, 3).
+        force: Ground reaction force on the body [N], laboratory axes, shape (samples, 3).
+        moment: Moment about the centre of the surface [N m], laboratory axes, shape (samples, 3).
+        origin: Where the sensors' level lies from that centre [m], laboratory axes, shape (3,).
+    """
+
+    name: str
+    corners: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Centre of the surface in the laboratory [m], shape (3,)."""
+        return np.asarray(self.corners.mean(axis=0))
+
+
+def plate_axes(corners: np.ndarray) -> np.ndarray:
+    """Return a plate's unit axes in the laboratory, one a row; NaN without extent."""
+    x = corners[0] - corners[1]
+    z = np.cross(x, corners[0] - corners[3])
+    y = np.cross(z, x)
+    with np.errstate(invalid="ignore"):
+        return np.stack([axis / np.linalg.norm(axis) for axis in (x, y, z)])
+
+
+def read_plates(content: Any, unit: float) -> tuple[tuple[ForcePlate, ...], tuple[str, ...]]:
+    """Return the plates that can be read, and a sentence about every other one.
+
+    Args:
+        content: ezc3d's view of the file.
+        unit: Length of the file's unit [m].
+    """
+    group = content["parameters"].get("FORCE_PLATFORM", {})
+    used = np.atleast_1d(group["USED"]["value"]) if "USED" in group else np.zeros(1)
+    if not used.size or not int(used[0]) or not content["data"]["analogs"].size:
+        return (), ()
+    analog, plates, remarks = _analog(content), [], []
+    for index in range(int(used[0])):
+        name = f"plate {index + 1}"
+        kinds = np.atleast_1d(group["TYPE"]["value"])
+        kind = int(kinds[index]) if index < kinds.size else 0
+        try:
+            plates.append(_plate(name, kind, _parameters(group, index), analog, content, unit))
+        except DataError as problem:
+            remarks.append(f"{name} is left out: it {problem}")
+        except (LookupError, ValueError):
+            remarks.append(f"{name} is left out: it lacks channels, corners or origin")
+    return tuple(plates), tuple(remarks)
+
+
+def _parameters(group: Mapping[str, Any], index: int) -> dict[str, np.ndarray]:
+    """Return a plate's corners (4, 3), origin (3,), channels (c,) and calibration (rows, c)."""
+    values = {
+        name: np.asarray(group[name]["value"], dtype=float)[..., index]
+        for name in ("CORNERS", "ORIGIN", "CHANNEL")
+    }
+    matrices = np.asarray(group.get("CAL_MATRIX", {"value": ()})["value"], dtype=float)
+    if matrices.ndim == 3 and index < matrices.shape[2]:
+        values["CAL_MATRIX"] = matrices[..., index]
+    return values
+
+
+def _plate(
+    name: str,
+    kind: int,
+    values: Mapping[str, np.ndarray],
+    analog: np.ndarray,
+    content: Any,
+    unit: float,
+) -> ForcePlate:
+    """Return one plate from its parameters and all analog channels, shape (samples, channels)."""
+    if kind not in _CHANNELS:
+        allowed = f"types {', '.join(map(str, _CHANNELS))}"
+        raise DataError(f"is of type {kind}", allowed=allowed)
+    columns = values["CHANNEL"][: _CHANNELS[kind]].astype(int) - 1
+    if columns.size < _CHANNELS[kind] or columns.min() < 0 or columns.max() >= analog.shape[1]:
+        raise DataError(f"names channels that are not there, and type {kind} has {_CHANNELS[kind]}")
+    channels = analog[:, columns]
+    if kind in _CALIBRATED:
+        rows, count = _CALIBRATED[kind]
+        if "CAL_MATRIX" not in values or min(values["CAL_MATRIX"].shape) < min(rows, count):
+            raise DataError(f"has no CAL_MATRIX of {rows} x {count}")
+        channels = channels @ values["CAL_MATRIX"][:rows, :count].T
+    # in files of some programs the sensors seem to lie above the surface
+    origin = values["ORIGIN"] * unit
+    origin = np.negative(origin) if origin[2] > 0.0 else origin
+    if kind in (3, 7):
+        wrench = _wrench_of_eight(channels, *np.abs(origin[:2]))
+        lengths = 1.0
+    else:
+        wrench = channels
+        lengths = _moment_unit(content, columns, unit, calibrated=kind in _CALIBRATED)
+    force, moment = wrench[:, :3], wrench[:, 3:6] * lengths
+    if kind == 1:  # centre of pressure and free moment in place of moments
+        point = np.column_stack([wrench[:, 3:5] * unit, np.zeros(len(wrench))])
+        moment = np.cross(point, force) + [0.0, 0.0, 1.0] * moment[:, 2:]
+        origin = origin * [0.0, 0.0, 1.0]
+    else:
+        origin = origin * [0.0, 0.0, 1.0] if kind in (3, 5, 7) else origin
+        moment = moment + np.cross(force, origin)
+    corners = values["CORNERS"].T * unit
+    axes = plate_axes(corners)
+    return ForcePlate(name, corners, force @ axes, moment @ axes, origin @ axes)
+
+
+def _wrench_of_eight(channels: np.ndarray, a: float, b: float) -> np.ndarray:
+    """Return force and moment of a plate with four sensors, shape (samples, 6).
+
+    Args:
+        channels: x12, x34, y14, y23, z1, z2, z3, z4 [N], shape (samples, 8).
+        a: Distance of the sensors from the centre along the plate's x [m].
+        b: The same along y [m].
+    """
+    x12, x34, y14, y23, z1, z2, z3, z4 = channels.T
+    return np.column_stack([
+        x12 + x34, y14 + y23, z1 + z2 + z3 + z4,
+        b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4), b * (-x12 + x34) + a * (y14 - y23),
+    ])  # fmt: skip
+
+
+def _moment_unit(content: Any, columns: np.ndarray, unit: float, calibrated: bool) -> float:
+    """Return the length in the unit of the moments [m]: their own, else the file's."""
+    group = content["parameters"]["ANALOG"]
+    units = [str(text) for text in continued(group, "UNITS")]
+    if not calibrated and columns[-1] < len(units):
+        own = units[columns[-1]].lower().strip().removeprefix("n").strip(" .*-")
+        return METRES.get(own, unit)
+    return unit
+
+
+def analog_offset_error(offset: np.ndarray, scale: np.ndarray, unsigned: bool) -> np.ndarray:
+    """Return what ezc3d adds to every channel by misreading ANALOG:OFFSET, shape of `offset`.
+
+    The parameter is a 16-bit word.  In a file of unsigned samples, an offset above 32767 reads as
+    a negative number; ezc3d 1.7 then takes its absolute value instead of adding 65536.
+
+    Args:
+        offset: ANALOG:OFFSET as read [counts].
+        scale: Physical units per count.
+        unsigned: Whether ANALOG:FORMAT is UNSIGNED.
+    """
+    true = np.mod(offset, 65536) if unsigned else offset
+    return (true - np.abs(offset)) * scale
+
+
+def _analog(content: Any) -> np.ndarray:
+    """Return the analog channels in physical units, shape (samples, channels)."""
+    group = content["parameters"]["ANALOG"]
+    channels = np.array(content["data"]["analogs"][0].T, dtype=float)
+    used = channels.shape[1]
+    offset, scale = (
+        np.asarray(continued(group, name), dtype=float)[:used] for name in ("OFFSET", "SCALE")
+    )
+    general = float(group["GEN_SCALE"]["value"][0])
+    form = group["FORMAT"]["value"] if "FORMAT" in group else []
+    unsigned = bool(form) and str(form[0]).strip().upper() == "UNSIGNED"
+    return channels - analog_offset_error(offset, scale * general, unsigned)
