@@ -252,6 +252,17 @@ def test_the_command_writes_what_a_config_takes(learnt: tuple[Path, Result]) -> 
     assert config.numbers["tissue.damping"] == summary["numbers"]["tissue.damping"]["learnt"]
 
 
+def test_one_trial_is_enough_and_cannot_be_left_out(
+    run: Run, recorded: RecordedGait, tmp_path: Path
+) -> None:
+    others = ", ".join(trial.name for trial in recorded.trials[1:])
+    result = call(run, tmp_path / "out", "--set", f"without=[{others}]")
+    assert result.exit_code == 0, result.output
+    assert "left out" not in result.output
+    summary = json.loads((tmp_path / "out" / "learn.json").read_text(encoding="utf-8"))
+    assert summary["left_out"] is None
+
+
 def test_a_second_call_solves_nothing_again(learnt: tuple[Path, Result], run: Run) -> None:
     out, first = learnt
     files = {path: path.stat().st_mtime_ns for path in (out / "steps").iterdir()}

@@ -317,7 +317,7 @@ def learn(study: LearnStudy, run: Run, work: Work) -> LearnResult:
         prior_misfit=float(best.x @ best.x),
         active=_bounds_that_act(learner, best.x),
         left_out=left_out_errors(
-            study.targets, recorded, targets, slopes, best.x, stride_at(optimum)
+            study.targets, recorded, targets, slopes, best.x, stride_at(optimum), study.without
         ),
         solves=sum(each.solves for each in learners),
         iterations=sum(each.iterations for each in learners),

@@ -117,6 +117,7 @@ def left_out_errors(
     slopes: np.ndarray,
     deviations: np.ndarray,
     stride: Stride,
+    without: Collection[str] = (),
 ) -> LeftOut | None:
     """Return how the trials are met that are left out one by one, to first order.
 
@@ -130,13 +131,15 @@ def left_out_errors(
         slopes: Derivatives of the weighed deviations, then of those from the priors, (m + n, n).
         deviations: The learnt numbers in prior standard deviations from their priors, (n,).
         stride: The stride that they predict.
+        without: Trials that were left out anyway.
     """
     rows, at = {}, 0
     for target in targets:
         size = target.mean.size
         rows[target.name] = slopes[at : at + size] / target.scale
         at += size
-    trials = sorted({each.name for side in SIDES for each in recorded.of("stride", side)})
+    shown = {each.name for side in SIDES for each in recorded.of("stride", side)}
+    trials = sorted(shown.difference(without))
     errors = []
     for trial in trials if len(trials) > 1 else ():
         rest = {t.name: t for t in targets_without(recorded, (trial,)) if t.name in rows}
