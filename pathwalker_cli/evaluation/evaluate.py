@@ -17,6 +17,7 @@ from pathwalker_cli.evaluation.differences import (
     rms_mean_cycle,
     rms_one_trial,
 )
+from pathwalker_cli.evaluation.norms import norm_note
 from pathwalker_cli.evaluation.paper import (
     PATIENT,
     PaperClaim,
@@ -144,6 +145,8 @@ def evaluate_gait(
     values = {measure.key: measure.of(gait) for measure in measures_in("evaluate")}
     spreads: dict[str, Spread] = {}
     notes = gait.notes
+    if gait.walker.condition == "barefoot" and gait.part is None:
+        notes += (norm_note(gait),)
     if recorded is None:
         notes += (
             f"patient {gait.walker.patient.id} has no {gait.walker.condition} recordings beside "

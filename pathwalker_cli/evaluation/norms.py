@@ -87,3 +87,14 @@ def within_norms(stride: Stride, deviations: float = 2.0) -> dict[str, float]:
             off = np.abs(np.array(lines) - norm.mean) / norm.sd
             shares[curve.key] = float(np.mean(off < deviations))
     return shares
+
+
+def norm_note(stride: Stride) -> str:
+    """Return in one sentence how much of the gait cycle is as typical children walk."""
+    shares = within_norms(stride)
+    curves = (curve for curve in ANGLES if curve.key in shares)
+    shown = ", ".join(f"{curve.name} {100.0 * shares[curve.key]:.0f}" for curve in curves)
+    return (
+        f"within two standard deviations of typical children at a {speed_class(stride)} speed "
+        f"(Schwartz et al. 2008), share of the gait cycle [%]: {shown}"
+    ).replace("_", " ")

@@ -364,7 +364,8 @@ def _bounds_that_act(learner: _Learner, deviations: np.ndarray) -> tuple[str, ..
     """Return the ranges of the problem and of the learnt numbers that hold the result."""
     optimum = learner.optimum(deviations)
     bounds = active_bounds(optimum.program, optimum.result)
-    ours = [str(b) for b in bounds if b.name in optimum.solver.bounds.sources]
+    asked = {*optimum.solver.bounds.sources, "duration"}
+    ours = [str(bound) for bound in bounds if bound.name in asked]
     for (place, prior), at in zip(learner.study.numbers.items(), deviations, strict=True):
         low, high = (prior.deviations(end) for end in prior.range)
         if min(at - low, high - at) < _AT_END:
