@@ -490,6 +490,17 @@ def write_studies(folder: Path, run: Path, note: str = "") -> None:
         "perturb/perturbation.json": base | {"optimum": optimum, "rows": [row, failed]},
         "sensitivity/sensitivity.json": base | {"optimum": optimum, "elasticities": elasticities},
     }  # fmt: skip
+    learnt = {
+        "learnt": 0.24,
+        "prior": 0.2,
+        "unit": "N m s/rad",
+        "interval": [0.1, 0.5],
+        "told": 0.3,
+    }
+    contents["learn/learn.json"] = base | {
+        "condition": "barefoot", "rms_mean_cycle": {"knee": 0.15}, "rms_own_cycles": {"knee": 0.09},
+        "numbers": {"tissue.damping": learnt}, "active_bounds": [],
+    }  # fmt: skip
     for name, content in contents.items():
         (folder / name).parent.mkdir(parents=True)
         (folder / name).write_text(json.dumps(content))

@@ -69,7 +69,9 @@ WORDS: dict[str, tuple[str, ...]] = {
                   "--set", "dorsiflexion.points=2", "--set", "plantarflexion.points=2"),
     "tradeoff": ("tradeoff", "--run", "worn", "--out", "out",
                  "--set", "walking_speed_weights=[0.0, 1.0]"),
-    "learn": ("learn", "--run", "bare", "--out", "out", "--set", "steps=1", "--set", "set={}"),
+    "learn": ("learn", "--run", "bare", "--out", "out", "--set", "steps=1", "--set", "set={}",
+              "--set", "smoothing=[0.0]", "--set",
+              "numbers={strengths.ankle_flexion.left: {prior: 6, factor: 2, range: [1, 60]}}"),
     "evaluate": ("worn", "bare", "-o", "out"),
     "verify": ("worn",),
     "rerun": ("worn", "--out", "out"),
@@ -285,7 +287,8 @@ def test_the_run_is_what_counts_whatever_became_of_the_file(command: str, here: 
             )
         assert now == before
     if command not in ("solve", "batch"):  # they take the motion alone
-        kept = (here / "worn" / "patient.yaml").read_bytes()
-        heavier(here / "worn" / "patient.yaml")
+        taken = here / ("bare" if command == "learn" else "worn") / "patient.yaml"
+        kept = taken.read_bytes()
+        heavier(taken)
         assert outcome(command) != before, "or this test shows nothing"
-        (here / "worn" / "patient.yaml").write_bytes(kept)
+        taken.write_bytes(kept)

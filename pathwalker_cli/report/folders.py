@@ -64,7 +64,12 @@ class Study:
         return measures if isinstance(measures, Mapping) else {}
 
     def stands_on(self, metrics: Mapping[str, Any]) -> bool:
-        """Return whether a run is the one around which the study was made."""
+        """Return whether a run is the one around which the study was made.
+
+        What was learnt stands on no run, but belongs to a patient.
+        """
+        if self.kind == "learn":
+            return bool(self.content.get("patient") == metrics.get("patient"))
         if any(self.content.get(key) != metrics.get(key) for key in ("problem", "patient")):
             return False
         optimum = self.optimum

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from pathwalker_cli.conventions import SIDES, STIFFNESSES
+from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.report.content import Row, Section, Table
 from pathwalker_cli.report.figures import drawn
@@ -16,6 +16,7 @@ from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.springs import recommended
 from pathwalker_cli.report.summaries import (
     LandscapeSummary,
+    LearnSummary,
     PerturbationSummary,
     SensitivitySummary,
     TradeoffSummary,
@@ -60,6 +61,8 @@ def _section(study: Study, run: ReportRun) -> Section:
             return _tradeoff(tradeoff)
         case UncertaintySummary() as summary:
             return _uncertainty(summary, *spreads_of(summary, study.folder))
+        case LearnSummary() as summary:
+            return _learnt(summary)
     entry = STUDIES[study.kind]  # pages draw no table of it, but say where its numbers stand
     return Section(entry.heading, (f"{entry.title} Its numbers: {study.folder / entry.summary}.",))
 
@@ -205,12 +208,35 @@ def _uncertainty(
     count = summary.draws - len(summary.failed)
     lines = [f"{summary.draws} draws of the uncertain numbers, {count} converged."]
     lines += [words for each in spreads if (words := _chance(each, summary.ranges))]
+    lines += summary.advice
     title = "Springs of all draws [N m/rad], and deviation of cost and gait from the base [%]"
     figure = partial(spread_figure, values, summary.ranges, spreads)
     drawings = (drawn(figure, "uncertainty", title, "tall"),) if count else ()
     table = Table(head, tuple(rows), columns="wwnnnp")
     return Section("Uncertainty of the patient's numbers", tuple(lines), tables=(table,),
                    drawings=drawings)  # fmt: skip
+
+
+def _learnt(summary: LearnSummary) -> Section:
+    """Return what the recordings say of body and cost, and what they do not."""
+    own = summary.rms_own_cycles
+    fit = ", ".join(
+        f"{joint} {to_degrees(rms):.1f} ({to_degrees(own.get(joint, np.nan)):.1f})"
+        for joint, rms in summary.rms_mean_cycle.items()
+    )
+    lines = (
+        f"Learnt from {summary.condition} strides. RMS difference to the mean recorded cycle, in "
+        f"brackets that of single recorded cycles [deg]: {fit}.",
+        f"Ranges that hold the result: {', '.join(summary.active_bounds) or 'none'}.",
+    )
+    rows = tuple(
+        Row((place, each.unit, f"{each.learnt:.3g}", " to ".join(f"{x:.3g}" for x in each.interval),
+             f"{each.prior:.3g}", f"{100.0 * each.told:.0f}"))
+        for place, each in summary.numbers.items()
+    )  # fmt: skip
+    head = ("", "unit", "learnt", "one deviation", "prior", "told by strides [%]")
+    table = Table(head, rows, columns="wwnnnn")
+    return Section("What the strides say of body and cost", lines, tables=(table,))
 
 
 def _spread_row(spread: Spread, strongest: str | None) -> Row:

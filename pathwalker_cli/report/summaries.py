@@ -122,6 +122,7 @@ class UncertaintySummary(Summary):
     number_ranges: dict[str, Pair] = {}
     further: dict[str, str] = {}
     spreads: dict[str, _Spread]
+    advice: list[str] = []
 
     @model_validator(mode="after")
     def _known_spreads(self) -> UncertaintySummary:
@@ -135,12 +136,31 @@ class UncertaintySummary(Summary):
         return self.stiffness_ranges | self.number_ranges
 
 
+class _LearntNumber(_Block):
+    learnt: float
+    prior: float
+    unit: str
+    interval: Pair
+    told: float
+
+
+class LearnSummary(Summary):
+    """What `learn` tells."""
+
+    condition: str
+    rms_mean_cycle: dict[str, float]
+    rms_own_cycles: dict[str, float]
+    numbers: dict[str, _LearntNumber]
+    active_bounds: list[str]
+
+
 SUMMARIES: Final[dict[str, type[BaseModel]]] = {
     "perturb": PerturbationSummary,
     "sensitivity": SensitivitySummary,
     "landscape": LandscapeSummary,
     "tradeoff": TradeoffSummary,
     "uncertainty": UncertaintySummary,
+    "learn": LearnSummary,
 }
 """What the summary holds by the command that writes it."""
 

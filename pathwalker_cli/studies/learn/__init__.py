@@ -309,6 +309,7 @@ def learn(study: LearnStudy, run: Run, work: Work) -> LearnResult:
         covariance=tuple(tuple(float(f"{x:.6g}") for x in row) for row in covariance),
     )
     return LearnResult(
+        problem=case.config.problem,
         learnt=learnt,
         stride=stride_at(optimum),
         recorded=recorded,

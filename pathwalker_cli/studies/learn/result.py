@@ -60,6 +60,7 @@ class LearnResult:
     """A set of learnt numbers beside the recordings that it comes from.
 
     Args:
+        problem: The problem whose numbers they are.
         learnt: The numbers.
         stride: The stride that they predict.
         recorded: The recordings.
@@ -74,6 +75,7 @@ class LearnResult:
         cpu_seconds: CPU seconds of this process after the first prediction.
     """
 
+    problem: str
     learnt: Learnt
     stride: Stride
     recorded: RecordedGait
@@ -198,7 +200,7 @@ def learn_content(result: LearnResult) -> dict[str, Any]:
     recorded = recorded_numbers(result.recorded)
     left = result.left_out
     return {
-        "study": "learn",
+        "problem": result.problem,
         "patient": result.learnt.patient,
         "condition": result.learnt.condition,
         "misfits": list(result.misfits),
@@ -221,7 +223,7 @@ def learn_content(result: LearnResult) -> dict[str, Any]:
         "solves": result.solves,
         "iterations": result.iterations,
         "seconds": result.seconds,
-        "cpu_seconds": result.cpu_seconds,
+        "seconds_cpu": result.cpu_seconds,
     }  # fmt: skip
 
 

@@ -210,6 +210,7 @@ def uncertainty_content(result: Uncertainty) -> dict[str, Any]:
         **range_content(result.ranges),
         **({"further": result.further} if result.further else {}),
         "spreads": {spread.measure.key: _spread_content(spread) for spread in spreads(result)},
+        "advice": list(_advice(result, spreads(result))) if result.converged else [],
     }
 
 
