@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from pathwalker_cli.conventions import GRAVITY
-from pathwalker_cli.evaluation.norms import CLASSES, norms, speed_class, within_norms
+from pathwalker_cli.evaluation.norms import (
+    CLASSES,
+    movement_profile,
+    norms,
+    profile_score,
+    speed_class,
+    within_norms,
+)
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.stride.stride import Stride
@@ -65,6 +72,14 @@ def test_typical_children_are_within_and_others_are_not() -> None:
     assert shares == pytest.approx(dict.fromkeys(shares, 1.0))
     assert set(shares) == {"angle_pelvis_tilt", "angle_hip", "angle_knee", "angle_ankle"}
     assert within_norms(stride(1.0, 40.0))["angle_knee"] == 0.0
+
+
+def test_the_profile_is_how_far_off_and_the_score_their_root_mean_square() -> None:
+    profile = movement_profile(stride(1.0, 8.0))
+    assert profile["angle_knee"] == pytest.approx(8.0)
+    assert profile["angle_hip"] == pytest.approx(0.0, abs=1e-9)
+    assert profile_score([stride(1.0, 8.0)]) == pytest.approx(8.0 / np.sqrt(4.0))
+    assert np.isnan(profile_score([]))
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from pathwalker_cli.evaluation.differences import (
     rms_mean_cycle,
     rms_one_trial,
 )
-from pathwalker_cli.evaluation.norms import norm_note
+from pathwalker_cli.evaluation.norms import norm_notes
 from pathwalker_cli.evaluation.paper import (
     PATIENT,
     PaperClaim,
@@ -146,7 +146,7 @@ def evaluate_gait(
     spreads: dict[str, Spread] = {}
     notes = gait.notes
     if gait.walker.condition == "barefoot" and gait.part is None:
-        notes += (norm_note(gait),)
+        notes += norm_notes(gait, () if recorded is None else recorded.cycles)
     if recorded is None:
         notes += (
             f"patient {gait.walker.patient.id} has no {gait.walker.condition} recordings beside "

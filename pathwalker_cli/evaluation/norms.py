@@ -6,7 +6,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
@@ -71,30 +71,69 @@ def norms(speed: str) -> Mapping[str, Norm]:
     }
 
 
+def _off(stride: Stride) -> dict[str, tuple[np.ndarray, Norm]]:
+    """Return the differences to typical children at the speed of a stride, by key of the curve.
+
+    Of a recorded cycle its own side counts.
+    """
+    typical, sides = norms(speed_class(stride)), SIDES if stride.side is None else (stride.side,)
+    found = {}
+    for curve in (*ANGLES, *MOMENTS):
+        norm = typical.get(curve.key)
+        if norm is not None:
+            each = (curve.lines(stride, side, norm.mean.size) for side in sides)
+            lines = np.array([line for one in each for line in one])
+            if lines.size:
+                found[curve.key] = lines - norm.mean, norm
+    return found
+
+
 def within_norms(stride: Stride, deviations: float = 2.0) -> dict[str, float]:
     """Return the share of the gait cycle within so many standard deviations of typical children.
 
     At the speed of the stride, right and left pooled, by key of the curve; [1].
     """
-    typical = norms(speed_class(stride))
-    shares = {}
-    for curve in (*ANGLES, *MOMENTS):
-        norm = typical.get(curve.key)
-        if norm is None:
-            continue
-        lines = [line for side in SIDES for line in curve.lines(stride, side, norm.mean.size)]
-        if lines:
-            off = np.abs(np.array(lines) - norm.mean) / norm.sd
-            shares[curve.key] = float(np.mean(off < deviations))
-    return shares
+    off = _off(stride).items()
+    return {k: float(np.mean(np.abs(lines) < deviations * norm.sd)) for k, (lines, norm) in off}
 
 
-def norm_note(stride: Stride) -> str:
-    """Return in one sentence how much of the gait cycle is as typical children walk."""
-    shares = within_norms(stride)
-    curves = (curve for curve in ANGLES if curve.key in shares)
-    shown = ", ".join(f"{curve.name} {100.0 * shares[curve.key]:.0f}" for curve in curves)
+def movement_profile(stride: Stride) -> dict[str, float]:
+    """Return the sagittal part of the Movement Analysis Profile by key of the angle [deg].
+
+    Root mean square differences to typical children at the speed of the stride, right and left
+    pooled; their root mean square is the sagittal part of the Gait Profile Score.
+
+    References:
+        Baker et al. (2009) Gait & Posture 30, 265-269.
+    """
+    angles = {curve.key for curve in ANGLES}
+    off = {key: lines for key, (lines, _) in _off(stride).items() if key in angles}
+    return {key: float(np.sqrt(np.mean(lines**2))) for key, lines in off.items()}
+
+
+def profile_score(strides: Iterable[Stride]) -> float:
+    """Return the mean sagittal Gait Profile Score of some strides [deg]; NaN without any."""
+    profiles = [[*movement_profile(stride).values()] for stride in strides]
+    scores = [float(np.sqrt(np.mean(np.square(each)))) for each in profiles if each]
+    return float(np.mean(scores)) if scores else float("nan")
+
+
+def norm_notes(stride: Stride, recorded: Iterable[Stride] = ()) -> tuple[str, ...]:
+    """Return in sentences how near a gait is to that of typical children at its speed.
+
+    Args:
+        stride: The gait.
+        recorded: Recorded cycles, each judged at its own speed.
+    """
+    shares, profile = within_norms(stride), movement_profile(stride)
+    curves = [curve for curve in ANGLES if curve.key in shares]
+    inside = ", ".join(f"{curve.name} {100.0 * shares[curve.key]:.0f}" for curve in curves)
+    parts = ", ".join(f"{curve.name} {profile[curve.key]:.1f}" for curve in curves)
+    own = profile_score(recorded)
+    beside = "" if np.isnan(own) else f"; of the recorded cycles {own:.1f}"
+    speed = speed_class(stride).replace("_", " ")
     return (
-        f"within two standard deviations of typical children at a {speed_class(stride)} speed "
-        f"(Schwartz et al. 2008), share of the gait cycle [%]: {shown}"
-    ).replace("_", " ")
+        f"within two standard deviations of typical children at a {speed} speed (Schwartz et al. "
+        f"2008), share of the gait cycle [%]: {inside}",
+        f"sagittal Gait Profile Score {profile_score([stride]):.1f} deg ({parts}){beside}",
+    )

@@ -81,6 +81,11 @@ class RecordedGait:
         """Return the strides of one kind and side."""
         return tuple(s for s in self.strides if (s.part, s.side) == (part, side))
 
+    @property
+    def cycles(self) -> tuple[Stride, ...]:
+        """Every recorded gait cycle, right ones first."""
+        return tuple(cycle for side in SIDES for cycle in self.of("stride", side))
+
     def stance_forces(self, side: Side) -> np.ndarray:
         """Return (forward, up) over every measured stance [N], shape (stances, POINTS, 2)."""
         found = [each.force[side] for each in self.of("stance", side) if each.force]
