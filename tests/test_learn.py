@@ -273,6 +273,16 @@ def test_a_second_call_solves_nothing_again(learnt: tuple[Path, Result], run: Ru
     assert all(line in again.output for line in told)
 
 
+def test_a_run_that_does_not_weigh_a_goal_is_refused(tmp_path: Path) -> None:
+    changes = ("learnt=null", "mesh.intervals=[2, 2, 2, 2, 2, 2, 2, 2]", "mesh.refinements=0")
+    case = load_case("predict-barefoot", changes=(*changes, "cost.activation_power=2"))
+    run_study(case, tmp_path / "run")
+    words = ["learn", "learn", "--run", str(tmp_path / "run"), "--set", "set={}"]
+    result = CliRunner().invoke(cli, [*words, "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2, result.output
+    assert "does not weigh 'time'" in result.output
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -22,6 +22,9 @@ from pathwalker_cli.patient.blocks import SegmentLengths
 _IDENTITY: Final = frozenset({"id", "description", "sex", "age_for_regressions_reason"})
 """Keys of a patient's file that hold no number."""
 
+_LISTED: Final = 5
+"""Numbers of a config that are told one by one."""
+
 Factor = Annotated[float, Quantity("", 0.01, 100.0)]
 Shift = Annotated[float, Quantity("SI units", -100.0, 100.0)]
 
@@ -76,6 +79,8 @@ def varied(
         content, Patient, where=f"{patient.id} with its variation", error=PatientError
     )
     notes = [f"{place} = {value:g}" for place, value in (numbers or {}).items()]
+    if len(notes) > _LISTED:
+        notes = [f"{len(notes)} numbers of the config, learnt or given"]
     notes += [f"{place} x {factor:g}" for place, factor in variation.scale.items()]
     notes += [f"{place} {amount:+g}" for place, amount in variation.shift.items()]
     changed._origin = patient._origin

@@ -251,13 +251,21 @@ def plan(study: LearnStudy, solver: GaitSolver) -> Plan:
                 allowed=", ".join(sorted({n.place for n in solver.walker.numbers})),
                 mend=did_you_mean(place, known),
             )  # fmt: skip
+    for place in study.numbers:
+        goal = place.removeprefix("cost.goals.")
+        if goal != place and not solver.config.cost.goals.get(goal):
+            raise ConfigError(
+                f"is learnt, but the problem of the run does not weigh '{goal}'",
+                where=f"numbers.{place}",
+                mend="leave --run out, or solve it with a weight for it",
+            )  # fmt: skip
     recorded = study.recorded(solver)
     trials = len({t.name for t in recorded.trials} - set(study.without))
     does = (
         f"learns {len(study.numbers)} numbers from {trials} {solver.walker.condition} trials, "
         f"{len(study.targets(recorded))} curves and numbers of the walk"
     )
-    return Plan(does, study.steps * study.starts, least=False)
+    return Plan(does, study.steps * study.starts * len(study.smoothing))
 
 
 def learn(study: LearnStudy, run: Run, work: Work) -> LearnResult:
