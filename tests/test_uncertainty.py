@@ -20,12 +20,20 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies import uncertainty as module
 from pathwalker_cli.studies.base import Work, base_run, load_study
+from pathwalker_cli.studies.neighbours import Solved
 from pathwalker_cli.studies.uncertainty import UncertaintyStudy, draw_cases, uncertainty
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input, draw, inputs_of
-from pathwalker_cli.studies.uncertainty.result import chance_level, rank_correlations, spreads
+from pathwalker_cli.studies.uncertainty.result import (
+    Uncertainty,
+    chance_level,
+    rank_correlations,
+    spreads,
+    uncertainty_content,
+)
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
@@ -322,3 +330,57 @@ def test_real_draws_do_not_depend_on_the_number_of_processes(tmp_path: Path) -> 
     for name in STIFFNESSES:
         low, high = one.ranges[name]
         assert all(low <= value <= high for value in one.values(name))
+
+
+# Learnt numbers
+
+
+def test_learnt_numbers_are_drawn_as_they_go_together() -> None:
+    learnt = load_config("predict-orthosis").learnt
+    assert learnt is not None
+    draws = draw((), 200, 3, learnt)
+    assert [entry.place for entry in draws.inputs] == list(learnt.numbers)
+    numbers = list(learnt.numbers.values())
+    deviations = np.array(
+        [[n.deviations(x) for n, x in zip(numbers, row, strict=True)] for row in draws.values]
+    )
+    spread = np.corrcoef(deviations.T)
+    wanted = np.array(learnt.covariance)
+    sizes = np.sqrt(np.diag(wanted))
+    strong = np.abs(wanted / np.outer(sizes, sizes)) > 0.5
+    assert spread[strong] == pytest.approx((wanted / np.outer(sizes, sizes))[strong], abs=0.15)
+    assert draws.variation(0).scale == draws.variation(0).shift == {}
+    assert draws.learnt(0).keys() == learnt.numbers.keys()
+
+
+def test_a_base_without_learnt_numbers_is_refused() -> None:
+    words = ["uncertainty", "uncertainty", "--set", "learnt=true"]
+    result = CliRunner().invoke(cli, words)
+    assert result.exit_code == 2
+    assert "has no learnt numbers" in result.output
+
+
+@pytest.mark.parametrize(
+    ("k_d", "words"),
+    [
+        (np.linspace(5.0, 92.0, 20), "not determined by what was learnt"),
+        (np.linspace(40.0, 44.0, 20), ": determined by what was learnt"),
+        (np.r_[np.full(15, 5.0), np.linspace(6.0, 9.0, 5)], "held by its limit, not determined"),
+    ],
+)
+def test_what_was_learnt_says_which_springs_it_leaves_open(k_d: np.ndarray, words: str) -> None:
+    config = load_config("predict-orthosis")
+    assert config.learnt is not None
+    draws = draw((), 20, 0, config.learnt)
+    keys = [measure.key for measure in measures_in("studies")]
+    base = dict.fromkeys(keys, 1.0)
+    solved = tuple(
+        Solved(f"draw-{i:05d}", "converged", {**base, STIFFNESSES[0]: float(x)}, 9, 0.1, False)
+        for i, x in enumerate(k_d)
+    )
+    ranges = dict.fromkeys(STIFFNESSES, (1.0, 1.0)) | {STIFFNESSES[0]: (5.0, 92.0)}
+    shown = measures_in("studies")
+    result = Uncertainty(config, "made", 42, base, ranges, shown, {}, draws, solved, 1.0, 1)
+    (advice,) = uncertainty_content(result)["advice"]
+    assert words in advice
+    assert "cost." not in advice

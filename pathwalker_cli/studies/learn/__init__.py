@@ -17,7 +17,7 @@ References:
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -153,7 +153,7 @@ class _Learner:
     targets: tuple[Target, ...]
     resolver: Resolver
     journal: Journal
-    report: Any
+    report: Callable[[str], object]
     name: str = "start-00"
     begin: Optimum | None = None
     solves: int = 0

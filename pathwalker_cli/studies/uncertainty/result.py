@@ -36,8 +36,11 @@ _LISTED: Final = 5
 QUANTILES: Final = (0.05, 0.5, 0.95)
 """What stands for the distribution of a measure: the middle, and the range of 90 % of draws."""
 
-_OPEN: Final = 0.5
+_OPEN: Final = 0.25
 """Share of the allowed range that draws must cover for a spring to count as not determined."""
+
+_HELD: Final = 0.5
+"""Share of draws at a limit from which on it is the limit that decides."""
 
 _CHANCE: Final = 0.05
 """Probability that among inputs without any effect the strongest one is named all the same."""
@@ -315,9 +318,11 @@ def _advice(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
             continue
         label, unit = spread.measure.label, spread.measure.unit
         share = (spread.quantiles[2] - spread.quantiles[0]) / (high - low)
-        open_ = "not determined" if share > _OPEN else "determined"
+        held = max(spread.lower or 0.0, spread.upper or 0.0) > _HELD
+        found = "held by its limit, not determined" if held else "determined"
         text = (
-            f"{label}: {open_} by what was learnt, {spread.quantiles[0]:.0f} to "
+            f"{label}: {'not determined' if share > _OPEN else found} by what was learnt, "
+            f"{spread.quantiles[0]:.0f} to "
             f"{spread.quantiles[2]:.0f} {unit} in 90 % of the draws"
         )
         sizes = np.nan_to_num(np.abs(spread.correlations[rows]))
