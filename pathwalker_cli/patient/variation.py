@@ -118,7 +118,10 @@ def _put(content: dict[str, Any], address: str, value: float) -> None:
 def _change(
     content: dict[str, Any], where: str, place: str, change: Callable[[float], float]
 ) -> None:
-    """Change every number at and below a place."""
+    """Change every number at and below a place, or a further number of this address."""
+    if place in content["numbers"]:
+        content["numbers"][place] = change(content["numbers"][place])
+        return
     *parents, last = place.split(".")
     holder: Any = content
     for depth, part in enumerate(parents):

@@ -243,6 +243,12 @@ def learn_lines(result: LearnResult) -> Iterator[str]:
         name = f"{place} [{unit}]" if (unit := result.unit(place)) else place
         yield (f"{name:<46}{number.learnt:>10.4g}  {f'{low:.4g} to {high:.4g}':>20}"
                f"{number.prior:>10.4g}  {told} ({100.0 * result.told[place]:.0f} %)")  # fmt: skip
+    silent = [place for place, told in result.told.items() if told <= TOLD]
+    if silent:
+        yield (
+            f"\nthe recordings do not determine {len(silent)} of {len(result.told)} numbers, which "
+            "stay where their priors put them or follow from others: compare no child by them"
+        )
     acting = ", ".join(result.active) or "none"
     yield f"\nranges that hold the result: {acting}"
     starts = ", ".join(f"{misfit:.2f}" for misfit in result.misfits)

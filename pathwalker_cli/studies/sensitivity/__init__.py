@@ -95,6 +95,7 @@ def asked_places(asked: SensitivityStudy, solver: GaitSolver) -> tuple[str, ...]
     free, walker = solver.free, solver.walker
     chosen = {place for u in free for place in (u.address, *u.addresses)}
     usual = default_places(walker.patient, solver.config.condition == "orthosis")
+    usual += tuple(place for place in walker.patient.numbers if walker.values.get(place))
     given = asked.places or tuple(place for place in usual if place not in chosen)
     places = (*(u.name for u in free), *given)
     unknown = [place for place in asked.check if place not in places]
