@@ -20,7 +20,8 @@ import numpy as np
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.studies.base import base_case, load_study, resolver_of
-from pathwalker_cli.studies.learn import LearnStudy, _descended, _Learner
+from pathwalker_cli.studies.learn import LearnStudy
+from pathwalker_cli.studies.learn.fit import Learner, descend
 from pathwalker_cli.studies.learn.targets import Target
 from pathwalker_cli.studies.neighbours import Journal
 from pathwalker_cli.studies.run import run_study
@@ -54,7 +55,9 @@ def main(draws: int = 20, strides: int = 13) -> None:
             truth = 0.5 * rng.standard_normal(len(study.numbers))
             places = [folder / f"{draw}-{part}" for part in ("truth", "steps")]
             made, learner = (
-                _Learner(study, run.case, recorded, resolver, Journal(place, run, resolver), str)
+                Learner(
+                    study.numbers, run.case, recorded, resolver, Journal(place, run, resolver), str
+                )
                 for place in places
             )
             optimum = made.optimum(truth)
@@ -65,7 +68,7 @@ def main(draws: int = 20, strides: int = 13) -> None:
             learner.targets = tuple(
                 replace(t, mean=t.of(stride) + noise(t, strides, rng)) for t in recorded
             )
-            end = _descended(learner, np.zeros(truth.size))
+            end = descend(learner, np.zeros(truth.size), study.steps, study.precision)
             deviations = np.sqrt(np.diag(np.linalg.inv(end.jac.T @ end.jac)))
             missed = np.abs(end.x - truth) / deviations
             told = deviations < np.sqrt(0.5)

@@ -18,7 +18,8 @@ from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
 from pathwalker_cli.results.run_folder import Run, load_run
 from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.studies.base import base_case, load_study, resolver_of
-from pathwalker_cli.studies.learn import LearnStudy, _descended, _Learner
+from pathwalker_cli.studies.learn import LearnStudy
+from pathwalker_cli.studies.learn.fit import Learner, descend
 from pathwalker_cli.studies.learn.targets import Target, residuals, targets_of
 from pathwalker_cli.studies.neighbours import Journal
 from pathwalker_cli.studies.run import run_study
@@ -58,10 +59,10 @@ def recorded() -> RecordedGait:
     return recordings
 
 
-def learner(study: LearnStudy, run: Run, targets: tuple[Target, ...], folder: Path) -> _Learner:
+def learner(study: LearnStudy, run: Run, targets: tuple[Target, ...], folder: Path) -> Learner:
     """Return what predicts for numbers and holds it against targets."""
     resolver = resolver_of(run)
-    return _Learner(study, run.case, targets, resolver, Journal(folder, run, resolver), str)
+    return Learner(study.numbers, run.case, targets, resolver, Journal(folder, run, resolver), str)
 
 
 # Priors and files
@@ -216,7 +217,7 @@ def test_known_numbers_are_found_within_the_stated_uncertainty(
     stride = stride_of(made.optimum(truth).series)
     targets = tuple(replace(t, mean=t.of(stride)) for t in recordings)
     predictions = learner(study, run, targets, tmp_path / "steps")
-    end = _descended(predictions, np.zeros(3))
+    end = descend(predictions, np.zeros(3), study.steps, study.precision)
     deviations = np.sqrt(np.diag(np.linalg.inv(end.jac.T @ end.jac)))
     assert (np.abs(end.x - truth) < 2.0 * deviations).all()
     assert np.sum(residuals(targets, stride_of(predictions.optimum(end.x).series)) ** 2) < 0.5

@@ -47,6 +47,7 @@ from pathwalker_cli.studies import (
 )
 from pathwalker_cli.studies import run as study_run
 from pathwalker_cli.studies.batch import worker
+from pathwalker_cli.studies.learn import fit
 from pathwalker_cli.verification import checks
 from report_runs import write_made_run
 
@@ -187,9 +188,10 @@ def quick(monkeypatch: pytest.MonkeyPatch, made_solution: Callable[..., GaitSolu
     monkeypatch.setattr(sensitivity, "Neighbourhood", Around)
     monkeypatch.setattr(sensitivity, "all_measures", lambda o: {"cost": 0.01 * kg(o)})
     monkeypatch.setattr(learn, "resolver_of", lambda run: MadeResolver(run.case))
-    monkeypatch.setattr(learn, "stride_at", lambda o: made_stride(made_solution, o.case))
-    monkeypatch.setattr(learn, "_bounds_that_act", lambda *_: ())
-    monkeypatch.setattr(learn._Learner, "slopes", no_slopes)
+    for place in (learn, fit):
+        monkeypatch.setattr(place, "stride_at", lambda o: made_stride(made_solution, o.case))
+    monkeypatch.setattr(learn, "ranges_that_act", lambda *_: ())
+    monkeypatch.setattr(fit.Learner, "slopes", no_slopes)
     for place in (landscape, tradeoff):
         monkeypatch.setattr(
             place, "measures", lambda o: {**made_measures(o), "stride_time": 0.03 * kg(o)}

@@ -9,8 +9,9 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from pathwalker_cli.config.schema import StudyConfig
-from pathwalker_cli.config.values import apply_change
+from pathwalker_cli.config.learnt import Learnt, config_values
+from pathwalker_cli.config.schema import StudyConfig, merged
+from pathwalker_cli.config.values import apply_change, nested
 from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.io.refusals import KeyPath, Lines
 from pathwalker_cli.io.yaml_file import read_mapping, validate
@@ -72,7 +73,7 @@ def read_config(
 
 
 def _with_learnt(mapping: dict[str, Any], source: Path, changes: tuple[str, ...]) -> None:
-    """Put learnt numbers in the place of the name of their file.
+    """Put learnt numbers in the place of the name of their file, and where the config is silent.
 
     A file is looked for beside the config, then beside the shipped patients.
 
@@ -90,7 +91,9 @@ def _with_learnt(mapping: dict[str, Any], source: Path, changes: tuple[str, ...]
             where=f"{source}, learnt",
             allowed="a file that `pathwalker learn` wrote, beside the config",
         )
-    mapping["learnt"] = read_mapping(file, ConfigError)[0]
+    content, lines = read_mapping(file, ConfigError)
+    learnt = validate(content, Learnt, where=str(file), error=ConfigError, lines=lines)
+    mapping.update(merged(nested(config_values(learnt.values)), mapping) | {"learnt": content})
 
 
 def config_content(path: str | Path) -> tuple[Path, dict[str, Any], Lines]:

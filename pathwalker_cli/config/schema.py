@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
-from pathwalker_cli.config.learnt import Learnt, config_values
+from pathwalker_cli.config.learnt import Learnt
 from pathwalker_cli.conventions import ANGLES, STIFFNESSES, Condition
 from pathwalker_cli.errors import did_you_mean
 from pathwalker_cli.gait.costs import GOALS, Costs
@@ -232,22 +232,6 @@ class StudyConfig(YamlModel):
         if not isinstance(problem, str) or problem not in PROBLEMS:
             return value
         return merged(PROBLEMS[problem].defaults, value)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _learnt(cls, value: Any) -> Any:
-        """Let learnt numbers stand where the config is silent."""
-        learnt = value.get("learnt") if isinstance(value, dict) else None
-        if learnt is None:
-            return value
-        known: dict[str, Any] = {}
-        for key, amount in config_values(Learnt.model_validate(learnt).values).items():
-            *above, last = key.split(".")
-            holder = known
-            for part in above:
-                holder = holder.setdefault(part, {})
-            holder[last] = amount
-        return merged(known, value)
 
     @field_validator("problem")
     @classmethod

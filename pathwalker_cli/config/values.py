@@ -54,6 +54,15 @@ def with_values(config: StudyConfig, values: Mapping[str, Any], where: str = "")
     return validate(content, StudyConfig, where=where or "overrides", error=ConfigError)
 
 
+def nested(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values by dotted key as the content of a config."""
+    content: dict[str, Any] = {}
+    for key, value in values.items():
+        inner, last = _holder(content, key, key)
+        inner[last] = value
+    return content
+
+
 def smoke_version(config: StudyConfig) -> StudyConfig:
     """Return a config with a short horizon for quick checks: coarse mesh, no refinement."""
     mesh = config.mesh.model_copy(update={"intervals": (2,) * len(PHASE_NAMES), "refinements": 0})

@@ -17,28 +17,31 @@ References:
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import numpy as np
 from pydantic import Field
-from scipy.optimize import least_squares
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config.learnt import COST, Learnt, LearntNumber, Prior, config_values
 from pathwalker_cli.config.schema import TrialName
-from pathwalker_cli.errors import ConfigError, DataError, NotConvergedError, did_you_mean
+from pathwalker_cli.errors import ConfigError, DataError, did_you_mean
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
-from pathwalker_cli.gait.resolve import Optimum, Resolver
+from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.fields import Quantity, YamlModel
-from pathwalker_cli.nlp.kkt import Answer
-from pathwalker_cli.ocp.violations import active_bounds
 from pathwalker_cli.results.run_folder import Run
-from pathwalker_cli.stride.stride import Stride, stride_of
 from pathwalker_cli.studies.base import NeighbourStudy, Plan, StudyKind, Work, resolver_of
+from pathwalker_cli.studies.learn.fit import (
+    Learner,
+    descend,
+    ranges_that_act,
+    smoothed,
+    stride_at,
+)
 from pathwalker_cli.studies.learn.result import (
     FILES,
     LearnResult,
@@ -47,20 +50,14 @@ from pathwalker_cli.studies.learn.result import (
     left_out_errors,
     write_learnt,
 )
-from pathwalker_cli.studies.learn.targets import Target, carried_weight, residuals, targets_of
-from pathwalker_cli.studies.neighbours import STOPPED, Journal
+from pathwalker_cli.studies.learn.targets import Target, carried_weight, targets_of
+from pathwalker_cli.studies.neighbours import Journal
 
 STEPS: Final = "steps"
 """Folder of the predictions that were solved on the way."""
 
-_STEP: Final = 1e-4
-"""Forward difference by which derivatives of the problem are taken [prior standard deviations]."""
-_AT_END: Final = 0.01
-"""Distance from an end of its range at which a number sits there [prior deviations]."""
 _WEIGHT_OFF: Final = 0.2
 """Share of the weight by which the load of both feet may be off: strides are not quite periodic."""
-_DIGITS: Final = 9
-"""Significant digits of the numbers that are tried: a restart asks for the very same."""
 
 
 class Weights(YamlModel):
@@ -133,109 +130,6 @@ class LearnStudy(NeighbourStudy):
         return targets_of(recorded, dict(self.weights), {*self.without, *without})
 
 
-@dataclass
-class _Learner:
-    """Predictions for numbers, counted in prior standard deviations from their priors.
-
-    Args:
-        study: What is learnt.
-        case: The problem.
-        targets: What its strides are held against.
-        resolver: Solves neighbours of the first prediction.
-        journal: Keeps what was solved.
-        report: Hears of every step.
-        name: Beginning of the names in the journal.
-        begin: The prediction to begin with; the first one if left out.
-    """
-
-    study: LearnStudy
-    case: Case
-    targets: tuple[Target, ...]
-    resolver: Resolver
-    journal: Journal
-    report: Callable[[str], object]
-    name: str = "start-00"
-    begin: Optimum | None = None
-    solves: int = 0
-    iterations: int = 0
-    _known: dict[bytes, Optimum] = field(default_factory=dict)
-    _at: tuple[np.ndarray, Optimum, list[Answer]] | None = None
-
-    def values(self, deviations: np.ndarray) -> dict[str, float]:
-        """Return the numbers by place [their units]."""
-        pairs = zip(self.study.numbers.items(), deviations, strict=True)
-        return {k: float(f"{p.value(float(d)):.{_DIGITS}g}") for (k, p), d in pairs}
-
-    def case_at(self, deviations: np.ndarray) -> Case:
-        """Return the problem with these numbers."""
-        return self.case.with_values(config_values(self.values(deviations)))
-
-    def optimum(self, deviations: np.ndarray) -> Optimum:
-        """Return the prediction, solved from the last one that was accepted."""
-        key = deviations.tobytes()
-        if key not in self._known:
-            name = f"{self.name}-{len(self._known):03d}"
-            begin = self._extrapolated(deviations)
-            optimum = self.journal.resolve(name, self.case_at(deviations), begin, insist=False)
-            self.solves += 1
-            self.iterations += optimum.result.iterations
-            self._known[key] = optimum
-        return self._known[key]
-
-    def _extrapolated(self, deviations: np.ndarray) -> Optimum | None:
-        """Return where the derivatives at the last step say that the optimum is."""
-        if self._at is None:
-            return self.begin
-        last, optimum, answers = self._at
-        steps = zip(answers, deviations - last, strict=True)
-        unknowns = optimum.result.unknowns + sum(a.unknowns * step for a, step in steps)
-        return replace(optimum, result=replace(optimum.result, unknowns=unknowns))
-
-    def misfit(self, deviations: np.ndarray) -> np.ndarray:
-        """Return all deviations, of the walk and of the numbers; NaN where nothing was found."""
-        optimum = self.optimum(deviations)
-        if not optimum.converged:
-            size = sum(target.mean.size for target in self.targets)
-            return np.full(size + deviations.size, np.nan)
-        return np.concatenate([residuals(self.targets, stride_at(optimum)), deviations])
-
-    def slopes(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the derivatives of `misfit` by all numbers."""
-        optimum = self.optimum(deviations)
-        answers, columns = [], []
-        here = residuals(self.targets, stride_at(optimum))
-        for step in _STEP * np.eye(deviations.size):
-            end = self.resolver.restored(self.case_at(deviations + step), optimum.result)
-            answer = optimum.kkt.answer(optimum.program, end.program, _STEP / 2.0)
-            there = residuals(self.targets, stride_at(_moved(end, _STEP * answer.unknowns)))
-            answers.append(answer)
-            columns.append((there - here) / _STEP)
-        self._at = deviations.copy(), optimum, answers
-        self._tell(deviations, optimum)
-        return np.vstack([np.array(columns).T, np.eye(deviations.size)])
-
-    def _tell(self, deviations: np.ndarray, optimum: Optimum) -> None:
-        stride = stride_at(optimum)
-        parts = [(t.group, float(np.sum(t.residual(stride) ** 2))) for t in self.targets]
-        groups = {group: sum(v for g, v in parts if g == group) for group, _ in parts}
-        shown = ", ".join(f"{group} {value:.2f}" for group, value in groups.items())
-        self.report(
-            f"step {self.solves:3d}  misfit {sum(groups.values()):7.3f} ({shown}), "
-            f"priors {float(deviations @ deviations):.2f}, {stride.walking_speed:.3f} m/s, "
-            f"{self.iterations} iterations"
-        )
-
-
-def stride_at(optimum: Optimum) -> Stride:
-    """Return the predicted stride of an optimum."""
-    return stride_of(optimum.series)
-
-
-def _moved(optimum: Optimum, unknowns: np.ndarray) -> Optimum:
-    result = replace(optimum.result, unknowns=optimum.result.unknowns + unknowns)
-    return replace(optimum, result=result)
-
-
 def plan(study: LearnStudy, solver: GaitSolver) -> Plan:
     """Return what would be learnt, and from what.
 
@@ -285,20 +179,20 @@ def learn(study: LearnStudy, run: Run, work: Work) -> LearnResult:
     case = run.case
     recorded = study.recorded(GaitSolver(case))
     targets = study.targets(recorded)
-    learners: list[_Learner] = []
+    learners: list[Learner] = []
     ends = []
     for start, at in enumerate(_starts(study)):
         begin: Optimum | None = None
         for stage, barrier in enumerate(study.smoothing):
-            smooth = replace(run, case=_smoothed(case, barrier))
+            smooth = replace(run, case=smoothed(case, barrier))
             resolver = resolver_of(smooth)
             journal = Journal(work.folder / STEPS, run, resolver)
             name = f"start-{start:02d}-{stage}"
-            learner = _Learner(
-                study, smooth.case, targets, resolver, journal, work.report, name, begin
+            learner = Learner(
+                study.numbers, smooth.case, targets, resolver, journal, work.report, name, begin
             )
             learners.append(learner)
-            end = _descended(learner, at)
+            end = descend(learner, at, study.steps, study.precision)
             at, begin = end.x, learner.optimum(end.x)
         ends.append((learner, end))
     learner, best = min(ends, key=lambda end: end[1].cost)
@@ -324,7 +218,7 @@ def learn(study: LearnStudy, run: Run, work: Work) -> LearnResult:
         targets=targets,
         misfits=tuple(2.0 * end.cost for _, end in ends),
         prior_misfit=float(best.x @ best.x),
-        active=_bounds_that_act(learner, best.x),
+        active=ranges_that_act(learner, best.x),
         left_out=left_out_errors(
             study.targets, recorded, targets, slopes, best.x, stride_at(optimum), study.without
         ),
@@ -335,51 +229,10 @@ def learn(study: LearnStudy, run: Run, work: Work) -> LearnResult:
     )
 
 
-def _smoothed(case: Case, barrier: float) -> Case:
-    """Return a problem that is solved with what this barrier leaves of its inequalities.
-
-    A bound that becomes active bends the way of the optimum; with a barrier the way is smooth.
-    """
-    if not barrier:
-        return case
-    return case.with_values({"solver.ipopt": {**case.config.solver.ipopt, "mu_target": barrier}})
-
-
 def _starts(study: LearnStudy) -> list[np.ndarray]:
     """Return where to begin: at the priors, then at draws from half of them."""
     size, rng = len(study.numbers), np.random.default_rng(study.seed)
     return [np.zeros(size), *(0.5 * rng.standard_normal((study.starts - 1, size)))]
-
-
-def _descended(learner: _Learner, start: np.ndarray) -> Any:
-    """Return where the trust-region method ends."""
-    numbers = learner.study.numbers.values()
-    limits = np.array([[p.deviations(end) for end in p.range] for p in numbers]).T
-    inside = np.clip(start, *(limits + np.array([[1e-6], [-1e-6]])))
-    if not np.isfinite(learner.misfit(inside)).all():
-        status = learner.optimum(inside).result.status
-        raise NotConvergedError(f"there is no prediction to begin with: {status}")
-    study = learner.study
-    try:
-        return least_squares(
-            learner.misfit, inside, learner.slopes, bounds=limits, max_nfev=study.steps,
-            ftol=study.precision, xtol=study.precision,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        raise NotConvergedError(STOPPED) from None
-
-
-def _bounds_that_act(learner: _Learner, deviations: np.ndarray) -> tuple[str, ...]:
-    """Return the ranges of the problem and of the learnt numbers that hold the result."""
-    optimum = learner.optimum(deviations)
-    bounds = active_bounds(optimum.program, optimum.result)
-    asked = {*optimum.solver.bounds.sources, "duration"}
-    ours = [str(bound) for bound in bounds if bound.name in asked]
-    for (place, prior), at in zip(learner.study.numbers.items(), deviations, strict=True):
-        low, high = (prior.deviations(end) for end in prior.range)
-        if min(at - low, high - at) < _AT_END:
-            ours.append(f"{place} at {prior.value(float(at)):.4g}")
-    return tuple(ours)
 
 
 def _write(result: LearnResult, folder: Path) -> None:
