@@ -8,11 +8,12 @@ from functools import cache
 from typing import Any, Final
 
 import numpy as np
-from jinja2 import Template
+from jinja2 import Environment, Template
 
 from pathwalker_cli.animation.drawing import (
     Drawing,
     Shape,
+    View,
     common_view,
     drawing,
     force_scale,
@@ -23,6 +24,7 @@ from pathwalker_cli.animation.look import (
     ACTIVATION_COLOURS,
     CAVEAT,
     DASHES,
+    SHADOW_COLOUR,
     SHELL_COLOUR,
     SPRING_COLOUR,
     arrow_look,
@@ -47,33 +49,53 @@ def html_page(runs: Sequence[GaitFrames]) -> str:
     view = common_view(drawings)
     return _template().render(
         title=" and ".join(frames.name for frames in runs),
-        caveat=CAVEAT,
         pace=pace(runs),
-        colours=ACTIVATION_COLOURS,
-        dashes=DASHES,
-        right=BODY_COLOUR["right"],
-        left=BODY_COLOUR["left"],
-        force=FORCE_COLOUR,
-        shell=SHELL_COLOUR,
-        spring=SPRING_COLOUR,
-        view=view,
-        panels=[_panel(each) for each in drawings],
-        with_orthosis=any(frames.condition == "orthosis" for frames in runs),
+        **walkers_content(drawings, view),
         data={
             "colours": ACTIVATION_COLOURS,
             "half_width": view.half_width,
-            "runs": [_data(each) for each in drawings],
+            "runs": [stride_data(each) for each in drawings],
         },
     )
+
+
+def walkers_content(drawings: Sequence[Drawing], view: View, shadow_name: str = "") -> dict[str, Any]:
+    """Return what `walker.html` needs of some strides: looks, words, and what is seen.
+
+    Args:
+        drawings: The strides.
+        view: What is seen of them.
+        shadow_name: What the shadows behind them are; "" if there are none.
+    """
+    return {
+        "caveat": CAVEAT,
+        "colours": ACTIVATION_COLOURS,
+        "dashes": DASHES,
+        "right": BODY_COLOUR["right"],
+        "left": BODY_COLOUR["left"],
+        "force": FORCE_COLOUR,
+        "shell": SHELL_COLOUR,
+        "spring": SPRING_COLOUR,
+        "shadow": SHADOW_COLOUR,
+        "shadow_name": shadow_name,
+        "view": view,
+        "panels": [_panel(each) for each in drawings],
+        "with_orthosis": any(each.frames.condition == "orthosis" for each in drawings),
+    }
 
 
 @cache
 def _template() -> Template:
     """Return the template of the page."""
-    environment = templates("pathwalker_cli.animation", ".")
-    # No spaces: the data of two strides is most of the page.
+    return page_templates().get_template("animation/page.html")
+
+
+def page_templates() -> Environment:
+    """Return the templates of pages with walkers, by their place in the package."""
+    environment = templates("pathwalker_cli", ".")
+    # No spaces: the data of strides is most of a page.
     environment.policies["json.dumps_kwargs"] = {"separators": (",", ":"), "allow_nan": False}
-    return environment.get_template("page.html")
+    return environment
 
 
 def _panel(each: Drawing) -> dict[str, Any]:
@@ -98,7 +120,7 @@ def _title(shape: Shape) -> str:
     return f"orthosis, {what}, {shape.side}" if shape.kind in ("shell", "spring") else what
 
 
-def _data(each: Drawing) -> dict[str, Any]:
+def stride_data(each: Drawing) -> dict[str, Any]:
     """Return what the script of the page needs of a stride."""
     frames = each.frames
     return {

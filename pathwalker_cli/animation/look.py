@@ -33,6 +33,9 @@ CAVEAT: Final = (
     "device."
 )
 
+SHADOW_COLOUR: Final = "#CC79A7"
+"""Another stride behind the walker: reddish purple of the palette by Okabe and Ito."""
+
 SHELL_COLOUR: Final = "#56B4E9"
 SPRING_COLOUR: Final = LINE_COLOUR["right"]
 """Areas and lines of the orthosis."""

@@ -121,16 +121,35 @@ class Neighbourhood:
     def _derivative(
         self, answer: Answer, factor: float, step: float, ends: Mapping[int, Optimum]
     ) -> Derivative:
-        result = self.optimum.result
         below, above = (
-            replace(
-                ends.get(sign, self.optimum),
-                result=replace(
-                    result,
-                    unknowns=result.unknowns + sign * step * factor * answer.unknowns,
-                    objective=result.objective + sign * step * factor * answer.cost,
-                ),
-            )
+            _moved_by(self.optimum, answer, sign * step * factor, ends.get(sign, self.optimum))
             for sign in (-1, 1)
         )
         return Derivative(answer.cost * factor, below, above, step)
+
+
+def extrapolated(
+    optimum: Optimum, below: Optimum, above: Optimum, step: float, there: Optimum
+) -> Optimum:
+    """Return an optimum to first order where some of its numbers have changed; none is solved.
+
+    Args:
+        optimum: The optimum.
+        below: The same unknowns in the program of a step back.
+        above: The same unknowns in the program of a step on the way.
+        step: That step as a share of the way.
+        there: The same unknowns in the program at the end of the way.
+    """
+    return _moved_by(optimum, optimum.kkt.answer(below.program, above.program, step), 1.0, there)
+
+
+def _moved_by(optimum: Optimum, answer: Answer, amount: float, there: Optimum) -> Optimum:
+    """Return the optimum that an answer leads to, in the program of `there`."""
+    result, multipliers = optimum.result, optimum.result.multipliers
+    result = replace(
+        result,
+        unknowns=result.unknowns + amount * answer.unknowns,
+        objective=result.objective + amount * answer.cost,
+        multipliers=replace(multipliers, rows=multipliers.rows + amount * answer.rows),
+    )
+    return replace(there, result=result)

@@ -17,6 +17,7 @@ from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult, NlpSolver, warm_pushes
 from pathwalker_cli.nlp.kkt import KktSystem
+from pathwalker_cli.nlp.watch import Observer
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.stride.series import GaitSeries, gait_series
@@ -131,6 +132,7 @@ class Resolver:
         motion: Its motion.
         multipliers: Its multipliers; without them the optimum is solved anew from its motion.
         tolerance: Optimality tolerance of all solves; that of the config if left out.
+        observer: Hears every iteration, and may end a solve.
     """
 
     def __init__(
@@ -139,12 +141,16 @@ class Resolver:
         motion: PhasedMotion,
         multipliers: Multipliers | None = None,
         tolerance: float | None = None,
+        observer: Observer | None = None,
     ) -> None:
+        self._observer = observer
         self._solver = GaitSolver(case)
         self._tolerance = tolerance or case.config.solver.tolerance
         steps = motion.phases[: len(self._solver.gait.phases)]
         self._motion = replace(motion, phases=steps)
-        self._program = self._program_of(self._solver)
+        self._program = CollocationProgram(
+            self._solver.blocks, self._solver.prediction, self._motion.meshes
+        )
         self._warm_solvers: dict[WarmStart, NlpSolver] = {}
         self._multipliers = multipliers
         if multipliers is not None and multipliers.rows.size != self._program.rows:
@@ -193,7 +199,7 @@ class Resolver:
         return Optimum(solver, self._program_of(solver), result)
 
     def _program_of(self, solver: GaitSolver) -> CollocationProgram:
-        return CollocationProgram(solver.blocks, solver.prediction, self._motion.meshes)
+        return self._program.with_numbers(solver.prediction)
 
     def _warm(self, start: WarmStart) -> NlpSolver:
         """Return the solver that begins with multipliers in this way."""
@@ -204,14 +210,15 @@ class Resolver:
             pushes = {} if start.push is None else warm_pushes(start.push)
             extra = {**choices.WATCHDOG, **pushes, **settings.extra}
             settings = replace(settings, max_iterations=choices.WARM_ITERATIONS, extra=extra)
-            self._warm_solvers[start] = NlpSolver(self._program, settings)
+            self._warm_solvers[start] = NlpSolver(self._program, settings, self._observer)
         return self._warm_solvers[start]
 
     @cached_property
     def _cold(self) -> NlpSolver:
         """Where the neighbour is too far for the multipliers to help."""
         barrier = self._solver.config.solver.warm_barrier
-        return NlpSolver(self._program, self._solver.settings(self._tolerance, barrier))
+        settings = self._solver.settings(self._tolerance, barrier)
+        return NlpSolver(self._program, settings, self._observer)
 
 
 def warm_start_for(program: CollocationProgram, start: np.ndarray) -> WarmStart:

@@ -179,17 +179,21 @@ def field_at(model: type[BaseModel], place: str) -> FieldInfo:
     field = model.model_fields[name]
     if not rest:
         return field
-    inner = next(part for part in (field.annotation, *get_args(field.annotation)) if is_model(part))
+    inner = _models_in(field)[0]
     if issubclass(inner, Sides):
         inner = inner.model_fields["right"].annotation
     return field_at(inner, rest)
 
 
+def _models_in(field: FieldInfo) -> list[Any]:
+    """Return the model of a field, which may be left out; none where it is no block."""
+    return [part for part in (field.annotation, *get_args(field.annotation)) if is_model(part)]
+
+
 def quantity_at(model: type[BaseModel], place: str) -> Quantity:
     """Return unit and range of the number at a dotted place below a model."""
     field = field_at(model, place)
-    inside: Any = field.annotation
     metadata = list(field.metadata)
-    if is_model(inside):
+    for inside in _models_in(field):
         metadata += get_args(side_type(inside))[1:]
     return next(entry for entry in metadata if isinstance(entry, Quantity))

@@ -11,7 +11,9 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager, suppress
-from multiprocessing.context import SpawnContext
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.resource_tracker import ensure_running
 from multiprocessing.synchronize import RLock
 from typing import Any, Final, TypeVar
@@ -56,6 +58,23 @@ def prepare_worker() -> None:
         os._exit(1)
 
     threading.Thread(target=wait_and_end, daemon=True).start()
+
+
+def begun_process(
+    work: Callable[..., None], *arguments: Any
+) -> tuple[SpawnProcess, Connection]:
+    """Return a process that does some work, and what to talk to it with.
+
+    The work is handed its end of that, then the arguments; it ends with this process.
+    """
+    here, there = Pipe()
+    process = multiprocessing.get_context("spawn").Process(
+        target=work, args=(there, *arguments), daemon=True
+    )
+    with _blocked_sigint():
+        process.start()
+    there.close()
+    return process, here
 
 
 class _KeptLocks(SpawnContext):

@@ -37,7 +37,8 @@ class ProgressReport:
     elapsed: float
 
 
-Observer = Callable[[ProgressReport], None]
+Observer = Callable[[ProgressReport], bool | None]
+"""Hears of an iteration; a true answer ends the solve."""
 
 
 class Watcher(ca.Callback):
@@ -85,7 +86,8 @@ class Watcher(ca.Callback):
             g = np.asarray(given["g"]).ravel()
             worst = float(np.maximum(self._lower - g, g - self._upper).max(initial=0.0))
             elapsed = time.perf_counter() - self._start
-            self._observer(ProgressReport(self.iteration, float(given["f"]), worst, elapsed))
+            report = ProgressReport(self.iteration, float(given["f"]), worst, elapsed)
+            self.stop |= bool(self._observer(report))
         return [int(self.stop)]
 
 

@@ -43,6 +43,12 @@ class CollocationProgram(Transcription[PhasePlaces]):
         layout = collocation_layout(blocks.problem, meshes, blocks.degree)
         super().__init__(blocks.problem, numbers, meshes, layout)
 
+    def with_numbers(self, numbers: ProblemNumbers) -> CollocationProgram:
+        """Return the program with other numbers; both evaluate the same functions."""
+        program = CollocationProgram(self.blocks, numbers, self.meshes)
+        program.functions = self.functions
+        return program
+
     def _occurrences(self) -> list[Occurrences]:
         phases = [
             occurrence

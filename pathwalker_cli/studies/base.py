@@ -116,25 +116,45 @@ class StudyKind(Generic[Study, Result]):
         Raises:
             ConfigError: If it lacks what is varied, or its neighbours cannot be solved.
         """
-        springless = config.condition != "orthosis" and not (
-            self.varies == "numbers" and config.free
-        )
-        refusals = (
-            (bool(self.varies) and springless,
-             f"{config.problem} is walked barefoot and has no springs",
-             "a problem with orthoses, e.g. mapd-orthosis", ""),
-            (config.transcription != _TRANSCRIPTION,
-             f"is solved by {config.transcription}, but neighbours are solved by {_TRANSCRIPTION}",
-             "", f"solve it with transcription: {_TRANSCRIPTION}"),
-            (self.predicts and config.fits, f"is {config.problem}, which follows a recording",
-             "a prediction, e.g. mapd-orthosis", ""),
-            (self.whole_cycle and config.half_cycle,
-             "is solved as half a cycle, in which the numbers of one side cannot change alone",
-             "", "solve it with half_cycle: false"),
-        )  # fmt: skip
-        for refused, what, allowed, mend in refusals:
-            if refused:
-                raise ConfigError(what, where=where, allowed=allowed, mend=mend)
+        require_neighbours(config, where, self.varies, self.predicts, self.whole_cycle)
+
+
+def require_neighbours(
+    config: StudyConfig,
+    where: str,
+    varies: Literal["", "numbers", "springs"] = "",
+    predicts: bool = False,
+    whole_cycle: bool = True,
+) -> None:
+    """Refuse a problem that lacks what is varied, or whose neighbours cannot be solved.
+
+    Args:
+        config: The config of the problem.
+        where: What the user called it.
+        varies: See `StudyKind`, as the others.
+        predicts: Whether it must not follow a recording.
+        whole_cycle: Whether it must be a whole stride.
+
+    Raises:
+        ConfigError: If it does.
+    """
+    springless = config.condition != "orthosis" and not (varies == "numbers" and config.free)
+    refusals = (
+        (bool(varies) and springless,
+         f"{config.problem} is walked barefoot and has no springs",
+         "a problem with orthoses, e.g. mapd-orthosis", ""),
+        (config.transcription != _TRANSCRIPTION,
+         f"is solved by {config.transcription}, but neighbours are solved by {_TRANSCRIPTION}",
+         "", f"solve it with transcription: {_TRANSCRIPTION}"),
+        (predicts and config.fits, f"is {config.problem}, which follows a recording",
+         "a prediction, e.g. mapd-orthosis", ""),
+        (whole_cycle and config.half_cycle,
+         "is solved as half a cycle, in which the numbers of one side cannot change alone",
+         "", "solve it with half_cycle: false"),
+    )  # fmt: skip
+    for refused, what, allowed, mend in refusals:
+        if refused:
+            raise ConfigError(what, where=where, allowed=allowed, mend=mend)
 
 
 def load_study(path: str | Path, model: type[Study], changes: tuple[str, ...] = ()) -> Study:

@@ -65,7 +65,7 @@ class RunLog:
 def run_study(
     study: StudyConfig | Case,
     folder: Path,
-    warm_start: Path | None = None,
+    warm_start: Path | Run | None = None,
     log: RunLog | None = None,
 ) -> Outcome:
     """Solve a study, judge its springs, and write its run folder.
@@ -73,7 +73,7 @@ def run_study(
     Args:
         study: The study; the patient of a config is read now.
         folder: The run folder; an earlier run in it is replaced.
-        warm_start: Folder of an earlier run to begin with.
+        warm_start: An earlier run to begin with, or its folder.
         log: Hears every iteration.
 
     Raises:
@@ -82,8 +82,9 @@ def run_study(
     """
     log, case = log or RunLog(), Case.of(study)
     check_target(folder)
-    earlier = None if warm_start is None else warm_start_run(warm_start, case.config)
-    inputs = run_inputs(case, warm_start)
+    earlier = warm_start if isinstance(warm_start, Run | None) else (
+        warm_start_run(warm_start, case.config))  # fmt: skip
+    inputs = run_inputs(case, None if earlier is None else earlier.folder)
     solution = _solve(case, earlier, log)
     verdict = verdict_of(solution) if case.config.verdict else None
     lines = _log_lines(solution, inputs, log)

@@ -1,5 +1,7 @@
 "use strict";
-(() => {
+// Draws walkers and the shadows beside them, and obeys the controls. Who gives a panel another run
+// draws it by `gait.draw()`.
+const gait = (() => {
   const data = JSON.parse(document.getElementById("gait-data").textContent);
   const play = document.getElementById("play");
   const slider = document.getElementById("cycle");
@@ -38,6 +40,7 @@
       this.run = run;
       this.shapes = [...svg.querySelectorAll(".shape")];
       this.arrows = [...svg.querySelectorAll(".arrow")];
+      this.shadows = [...svg.querySelectorAll(".shadow")];
       this.marks = svg.querySelector(".marks");
       this.labels = Array.from({ length: Math.ceil(4 * data.half_width) + 1 }, () => {
         const label = document.createElementNS(SVG, "text");
@@ -79,10 +82,31 @@
           there ? between(corner, there[j]) : [corner[0] - eye, corner[1]]);
         this.arrows[k].setAttribute("d", corners ? path(corners, true) : "");
       });
+      this.drawShadow(cycle);
       this.drawGround(eye + Math.floor(at) * run.distance);
       this.phase.textContent = run.phases[i];
       this.time.textContent = `${(cycle * run.duration).toFixed(2)} s`;
       this.percent.textContent = `${(100 * cycle).toFixed(0)} % of right gait cycle`;
+    }
+
+    // Another stride as lines, at the same share of its own cycle: right and middle, then left.
+    drawShadow(cycle) {
+      const { shadow } = this.run;
+      const drawn = ["", ""];
+      for (const { left, names } of shadow ? shadow.chains : []) {
+        const corners = names.map((name) => {
+          const xz = shadow.points[name];
+          const i = Math.min(Math.floor(cycle * xz.length), xz.length - 1);
+          const next = (i + 1) % xz.length;
+          const share = cycle * xz.length - i;
+          const ahead = next === 0 ? shadow.distance : 0;
+          const eye = shadow.middle + cycle * shadow.distance;
+          return xz[i] && xz[next] &&
+            [mix(xz[i][0], xz[next][0] + ahead, share) - eye, mix(xz[i][1], xz[next][1], share)];
+        });
+        if (corners.every(Boolean)) drawn[left ? 1 : 0] += path(corners, false);
+      }
+      this.shadows.forEach((line, k) => line.setAttribute("d", drawn[k]));
     }
 
     // A mark every 0.1 m, longer and with its distance every 0.5 m.
@@ -172,4 +196,5 @@
   playing = false;
   draw();
   setPlaying(starts);
+  return { panels, draw };
 })();

@@ -1,0 +1,1 @@
+"""Play with a run: sliders for its numbers, each move solved again from where it was."""

@@ -1,0 +1,103 @@
+"""A run that is played with: where its dials stand, what was solved, and what is near."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from pathwalker_cli.errors import InputError
+from pathwalker_cli.explore.dials import Settings, case_at, dials_of, settings_of
+from pathwalker_cli.gait.neighbourhood import extrapolated
+from pathwalker_cli.gait.resolve import Optimum, Resolver
+from pathwalker_cli.nlp.watch import Observer
+from pathwalker_cli.results.run_folder import Run
+from pathwalker_cli.studies.base import require_optimum
+from pathwalker_cli.studies.run import Outcome, run_study
+
+_STEP: Final = 1e-4
+"""Share of a move by which its derivatives are taken."""
+
+
+class Session:
+    """The optimum that is looked at, and those around it.
+
+    Args:
+        run: The run.
+        observer: Hears every iteration, and may end a solve.
+
+    Raises:
+        NotConvergedError: If the run cannot be solved again.
+    """
+
+    def __init__(self, run: Run, observer: Observer | None = None) -> None:
+        self.run = run
+        self._resolver = Resolver(run.case, run.motion, run.multipliers, observer=observer)
+        found = require_optimum(self._resolver, run, run.config.solver.tolerance)
+        self.dials = dials_of(found)
+        self.settings: Settings = settings_of(self.dials)
+        # the same with every spring held: its neighbours have the structure of all others
+        self._home = self._resolver.resolve(case_at(run.case, self.dials, {}), found)
+        self.optimum = self._home
+
+    def first_order(self, settings: Settings) -> Optimum | None:
+        """Return the optimum extrapolated to other settings; nothing is solved.
+
+        None where no derivative leads there: where other numbers are the problem's to choose, or
+        none are.
+        """
+        before, after = (settings_of(self.dials) | dict(s) for s in (self.settings, settings))
+        if [v is None for v in before.values()] != [v is None for v in after.values()]:
+            return None
+
+        def moved(share: float) -> Settings:
+            return {
+                key: None if value is None else value + share * ((after[key] or 0.0) - value)
+                for key, value in before.items()
+            }
+
+        try:
+            ends = [self._resolver.restored(case_at(self.run.case, self.dials, moved(share)),
+                                            self.optimum.result) for share in (-_STEP, _STEP, 1.0)]
+        except InputError:  # the end of what is allowed
+            return None
+        below, above, there = ends
+        return extrapolated(self.optimum, below, above, _STEP, there)
+
+    def solve(self, settings: Settings, start: Optimum | None = None) -> Optimum:
+        """Solve the problem with other settings and go there; if that fails, stay.
+
+        Args:
+            settings: Where the dials stand.
+            start: The same extrapolated, to begin with.
+
+        Raises:
+            InputError: If config or patient refuse the numbers.
+        """
+        case = case_at(self.run.case, self.dials, settings)
+        end = self.optimum
+        for begin in self._starts(start):
+            end = self._resolver.resolve(case, begin, insist=False)
+            if end.converged or end.result.status == "stopped by the user":
+                break
+        if end.converged:
+            self.optimum, self.settings = end, dict(settings)
+        return end
+
+    def _starts(self, start: Optimum | None) -> Iterator[Optimum]:
+        """Yield where to begin, the likeliest first."""
+        if start is not None:
+            yield start
+        yield self.optimum
+        if self.optimum is not self._home:
+            yield self._home
+
+    def save(self, folder: Path) -> Outcome:
+        """Write what is looked at as a run, its mesh refined to the accuracy of the config.
+
+        Raises:
+            DataError: If the folder holds something else or cannot be written.
+        """
+        case = self.optimum.case.with_values({"verdict": False})
+        return run_study(case, folder, replace(self.run, motion=self.optimum.motion))
