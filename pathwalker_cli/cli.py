@@ -46,6 +46,7 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
         "pages",
         "Draw the walker of one or two runs, moving: a page for the browser, a GIF or an MP4.",
     ),
+    "explore": ("explore", "Turn the numbers of a run on a page and see how the walk changes."),
     "view": ("pages", "Show the stride of a run in 3D."),
     "model": ("model", "Write the walking model of a patient as a URDF."),
     "import": ("recorded", "Turn C3D files into joint angles, events and forces."),
@@ -72,7 +73,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Predict": ("solve", "batch", "reproduce"),
     "Springs and certainty": tuple(STUDIES),
     "Recorded gait": ("import", "ik", "id"),
-    "Look and compare": ("report", "animate", "view", "compare", "evaluate", "model"),
+    "Look and compare": ("report", "animate", "explore", "view", "compare", "evaluate", "model"),
     "Prove": ("verify", "rerun"),
     "Set up": ("init", "check", "doctor", "completion"),
 }

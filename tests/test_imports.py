@@ -36,7 +36,7 @@ LAYERS = (
     {"results"},
     {"evaluation"},
     {"studies"},
-    {"reproduce", "report", "animation", "starter", "checking", "verification"},
+    {"reproduce", "report", "animation", "explore", "starter", "checking", "verification"},
     {"commands"},
     {"cli"},
 )
@@ -76,6 +76,7 @@ CONFINED = {
     "dask_jobqueue": ("studies.batch.cluster",),
     "distributed": ("studies.batch.cluster",),
     "ezc3d": ("io",),
+    "tornado": ("explore.server",),
     "pebble": ("io.processes", "studies.batch.worker"),
     "yaml": ("io",),
 }

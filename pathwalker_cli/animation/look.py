@@ -87,13 +87,16 @@ def arrow_look(side: Side) -> Look:
     return Look(FORCE_COLOUR, 0.004, False, FORCE_COLOUR if side == "right" else "#ffffff")
 
 
+def who(frames: GaitFrames) -> str:
+    """Return who walks, and with what."""
+    condition = "with orthoses" if frames.condition == "orthosis" else "barefoot"
+    return f"{frames.patient}, {condition} ({frames.problem})"
+
+
 def subtitle(frames: GaitFrames) -> str:
     """Return in one line who walks how fast."""
-    condition = "with orthoses" if frames.condition == "orthosis" else "barefoot"
-    return (
-        f"{frames.patient}, {condition} ({frames.problem}): {frames.walking_speed:.2f} m/s, "
-        f"stride {frames.distance:.2f} m in {frames.duration:.2f} s"
-    )
+    walk = f"stride {frames.distance:.2f} m in {frames.duration:.2f} s"
+    return f"{who(frames)}: {frames.walking_speed:.2f} m/s, {walk}"
 
 
 def pace(runs: Sequence[GaitFrames]) -> str:

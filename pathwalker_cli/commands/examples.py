@@ -22,6 +22,8 @@ pathwalker report runs/mapd-barefoot runs/mapd-orthosis -o report.html
 pathwalker report runs/cohort -o cohort.html
 pathwalker animate runs/mapd-barefoot runs/mapd-orthosis -o gait.html
 pathwalker animate runs/mapd-orthosis -o gait.mp4 --strides 3 --slow 2
+pathwalker explore runs/mapd-orthosis
+pathwalker explore runs/mapd-orthosis -o explore.html
 pathwalker view runs/mapd-orthosis
 pathwalker compare runs/mapd-barefoot runs/mapd-orthosis
 pathwalker compare runs/first runs/second runs/third -o compared --json

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -15,6 +14,9 @@ from pathwalker_cli.nlp.watch import Observer
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import require_optimum
 from pathwalker_cli.studies.run import Outcome, run_study
+
+STOPPED: Final = "stopped by the user"
+"""Status of a solve that its observer ended."""
 
 _STEP: Final = 1e-4
 """Share of a move by which its derivatives are taken."""
@@ -33,13 +35,15 @@ class Session:
 
     def __init__(self, run: Run, observer: Observer | None = None) -> None:
         self.run = run
-        self._resolver = Resolver(run.case, run.motion, run.multipliers, observer=observer)
-        found = require_optimum(self._resolver, run, run.config.solver.tolerance)
+        self.resolver = Resolver(run.case, run.motion, run.multipliers, observer=observer)
+        found = require_optimum(self.resolver, run, run.config.solver.tolerance)
         self.dials = dials_of(found)
         self.settings: Settings = settings_of(self.dials)
         # the same with every spring held: its neighbours have the structure of all others
-        self._home = self._resolver.resolve(case_at(run.case, self.dials, {}), found)
+        self._home = self.resolver.resolve(case_at(run.case, self.dials, {}), found)
         self.optimum = self._home
+        self.away = False
+        """Whether it was not yet solved from the run itself."""
 
     def first_order(self, settings: Settings) -> Optimum | None:
         """Return the optimum extrapolated to other settings; nothing is solved.
@@ -58,7 +62,7 @@ class Session:
             }
 
         try:
-            ends = [self._resolver.restored(case_at(self.run.case, self.dials, moved(share)),
+            ends = [self.resolver.restored(case_at(self.run.case, self.dials, moved(share)),
                                             self.optimum.result) for share in (-_STEP, _STEP, 1.0)]
         except InputError:  # the end of what is allowed
             return None
@@ -75,23 +79,27 @@ class Session:
         Raises:
             InputError: If config or patient refuse the numbers.
         """
-        case = case_at(self.run.case, self.dials, settings)
-        end = self.optimum
-        for begin in self._starts(start):
-            end = self._resolver.resolve(case, begin, insist=False)
-            if end.converged or end.result.status == "stopped by the user":
+        case, end = case_at(self.run.case, self.dials, settings), self.optimum
+        starts = [start or self.optimum, self._home]
+        for begin in starts if self.optimum is not self._home else starts[:1]:
+            end = self.resolver.resolve(case, begin, insist=False)
+            if end.converged or end.result.status == STOPPED:
                 break
         if end.converged:
             self.optimum, self.settings = end, dict(settings)
+            self.away = True
         return end
 
-    def _starts(self, start: Optimum | None) -> Iterator[Optimum]:
-        """Yield where to begin, the likeliest first."""
-        if start is not None:
-            yield start
-        yield self.optimum
-        if self.optimum is not self._home:
-            yield self._home
+    def solve_from_run(self) -> Optimum:
+        """Solve what is looked at once more, from the run, and stay with the better one.
+
+        Where a solve ends depends on where it began: on the way that was taken.
+        """
+        end = self.resolver.resolve(self.optimum.case, self._home, insist=False)
+        self.away = end.result.status == STOPPED  # then it is still to be done
+        if end.converged and end.cost < self.optimum.cost:
+            self.optimum = end
+        return end
 
     def save(self, folder: Path) -> Outcome:
         """Write what is looked at as a run, its mesh refined to the accuracy of the config.

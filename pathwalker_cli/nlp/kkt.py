@@ -227,7 +227,7 @@ class KktSystem:
         push = np.where(np.isfinite(change.bounds), change.bounds, 0.0) * self._bound_ratio
         upper = (push - change.gradient - hessian @ unknowns)[self._moving]
         lower = (-change.rows - jacobian @ unknowns)[self._rows]
-        solved = self._factors.solve(np.concatenate([upper, lower]))
+        solved = self.factors.solve(np.concatenate([upper, lower]))
         unknowns[self._moving] = solved[: len(self._moving)]
         rows = np.zeros(len(self.result.rows))
         rows[self._rows] = solved[len(self._moving) :]
@@ -247,7 +247,8 @@ class KktSystem:
         return (triangle + sparse.triu(triangle, 1).T).tocsr(), jacobian.sparse().tocsr()
 
     @cached_property
-    def _factors(self) -> SymmetricSystem:
+    def factors(self) -> SymmetricSystem:
+        """The factorised system, free parameters fixed; what takes longest of all answers."""
         hessian, jacobian = self._second_order
         barrier = sparse.diags_array(self._bound_ratio[self._moving])
         h = hessian[self._moving][:, self._moving] + barrier

@@ -106,6 +106,11 @@ class Measure:
         """Unit for people: degrees for angles, none for plain numbers."""
         return "%" if self.is_share else _SHOWN_UNIT.get(self.unit, self.unit)
 
+    @property
+    def digits(self) -> int:
+        """Digits behind the point for people."""
+        return 1 if self.is_share else _DIGITS.get(self.unit, 3)
+
     def in_shown_unit(self, value: float) -> float:
         """Return a value in the unit for people."""
         if self.is_share:
@@ -116,9 +121,8 @@ class Measure:
         """Return a value as people read it, "-" for none."""
         if value is None:
             return "-"
-        digits = 1 if self.is_share else _DIGITS.get(self.unit, 3)
-        shown = round(self.in_shown_unit(value), digits) + 0.0  # adding 0.0 makes 0.0 of -0.0
-        return f"{shown:{'+' if sign else ''}.{digits}f}"
+        shown = round(self.in_shown_unit(value), self.digits) + 0.0  # adding 0.0 makes 0.0 of -0.0
+        return f"{shown:{'+' if sign else ''}.{self.digits}f}"
 
 
 def per_side(

@@ -60,17 +60,25 @@ class Journal:
         Raises:
             NotConvergedError: If the user stopped it: nothing further is wanted then.
         """
-        seal = sha256(f"{self._origin} {config_text(case.config)}".encode())
-        path = self.folder / f"{name}.npz"
-        result = _read(path, seal)
-        if result is not None:
-            return self.resolver.restored(case, result)
+        kept = self.kept(name, case)
+        if kept is not None:
+            return kept
         optimum = self.resolver.resolve(case, start, insist)
         self.solved += 1
         if optimum.result.status == "stopped by the user":
             raise NotConvergedError(STOPPED)
-        _write(path, seal, optimum.result)
+        _write(*self._place(name, case), optimum.result)
         return optimum
+
+    def kept(self, name: str, case: Case) -> Optimum | None:
+        """Return a neighbour that was solved before; None if it is not there, or is another one."""
+        result = _read(*self._place(name, case))
+        return None if result is None else self.resolver.restored(case, result)
+
+    def _place(self, name: str, case: Case) -> tuple[Path, str]:
+        """Return the file of a neighbour and what seals it."""
+        seal = sha256(f"{self._origin} {config_text(case.config)}".encode())
+        return self.folder / f"{name}.npz", seal
 
 
 def _write(path: Path, seal: str, result: NlpResult) -> None:
