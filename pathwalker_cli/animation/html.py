@@ -59,7 +59,9 @@ def html_page(runs: Sequence[GaitFrames]) -> str:
     )
 
 
-def walkers_content(drawings: Sequence[Drawing], view: View, shadow_name: str = "") -> dict[str, Any]:
+def walkers_content(
+    drawings: Sequence[Drawing], view: View, shadow_name: str = ""
+) -> dict[str, Any]:
     """Return what `walker.html` needs of some strides: looks, words, and what is seen.
 
     Args:

@@ -14,6 +14,7 @@
   let latest = 0; // number of the last move
   let saving = false;
   let undoing = false;
+  let solving = false;
 
   const CHAINS = [false, true].flatMap((left) => {
     const s = left ? "l" : "r";
@@ -40,6 +41,7 @@
       outputs[i].textContent = digits(at * dial.size, Math.max(Math.abs(dial.low), Math.abs(dial.high)) * dial.size);
       outputs[i].className = value === dial.value ? "" : "moved";
     });
+    if (find("#save")) find("#save").disabled = saving || solving;
     document.querySelectorAll("[data-free]").forEach((tick) => {
       tick.checked = places(tick, "free").every((i) => settings[dials[i].key] === null);
     });
@@ -142,6 +144,7 @@
       undoing = false;
       shown = state;
       if (old) return;
+      solving = false;
       show(shown.picture, before[before.length - 1]);
       showDials();
       say(message.label || "solved", message.kind === "better"
@@ -149,10 +152,11 @@
     } else if (message.kind === "moved") {
       latest = message.number;
       settings = message.settings;
+      solving = true;
       showDials();
     } else if (message.kind === "refused") {
       if (old) return;
-      saving = false;
+      saving = solving = undoing = false;
       settings = { ...shown.settings };
       show(shown.picture, before[before.length - 1]);
       showDials();

@@ -35,13 +35,17 @@ def explore_page(session: Session, name: str, offline: Mapping[str, Any] | None 
     drawn = drawing_of(session.optimum, name)
     view = common_view([drawn])
     view = replace(view, half_width=_ROOM * view.half_width, top=_ROOM * view.top)
-    return page_templates().get_template("explore/explore.html").render(
-        name=name,
-        who=who(drawn.frames),
-        groups=_groups(session.dials),
-        offline=offline is not None,
-        **walkers_content([drawn], view, SHADOW),
-        data=_data(session, name, view) | {"offline": offline},
+    return (
+        page_templates()
+        .get_template("explore/explore.html")
+        .render(
+            name=name,
+            who=who(drawn.frames),
+            groups=_groups(session.dials),
+            offline=offline is not None,
+            **walkers_content([drawn], view, SHADOW),
+            data=_data(session, name, view) | {"offline": offline},
+        )
     )
 
 
@@ -60,7 +64,12 @@ def _data(session: Session, name: str, view: View) -> dict[str, Any]:
             for curve in CURVES
         ],
         "numbers": [
-            {"key": m.key, "label": m.label, "unit": m.shown_unit, "digits": m.digits + (m.key == "cost")}
+            {
+                "key": m.key,
+                "label": m.label,
+                "unit": m.shown_unit,
+                "digits": m.digits + (m.key == "cost"),
+            }
             for m in numbers_shown()
         ],
     }

@@ -1,4 +1,4 @@
-"""What is seen of an optimum: the walker, its curves and its numbers, as plain values for a page."""
+"""What is seen of an optimum: walker, curves and numbers, as plain values for a page."""
 
 from __future__ import annotations
 

@@ -95,7 +95,10 @@ class Desk:
 
     def application(self) -> Application:
         """Return what answers requests."""
-        routes = [(r"/([^/]+)/", Page, {"desk": self}), (r"/([^/]+)/socket", Socket, {"desk": self})]
+        routes = [
+            (r"/([^/]+)/", Page, {"desk": self}),
+            (r"/([^/]+)/socket", Socket, {"desk": self}),
+        ]
         return Application(
             routes, websocket_max_message_size=_LARGEST, log_function=lambda handler: None
         )  # fmt: skip
@@ -218,7 +221,8 @@ class Page(_Guarded):
     def set_default_headers(self) -> None:
         """Let no other page embed it, and none keep it."""
         headers = {"X-Frame-Options": "DENY", "Cache-Control": "no-store",
-                   "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"}  # fmt: skip
+                   "Referrer-Policy": "no-referrer",
+                   "X-Content-Type-Options": "nosniff"}  # fmt: skip
         for name, value in headers.items():
             self.set_header(name, value)
 

@@ -38,12 +38,16 @@ class Session:
         self.resolver = Resolver(run.case, run.motion, run.multipliers, observer=observer)
         found = require_optimum(self.resolver, run, run.config.solver.tolerance)
         self.dials = dials_of(found)
-        self.settings: Settings = settings_of(self.dials)
-        # the same with every spring held: its neighbours have the structure of all others
+        # with every spring held, as in what is near
         self._home = self.resolver.resolve(case_at(run.case, self.dials, {}), found)
-        self.optimum = self._home
+        self.optimum: Optimum = self._home
+        self.settings: Settings = settings_of(self.dials)
         self.away = False
-        """Whether it was not yet solved from the run itself."""
+        """Whether what is looked at was not yet solved from the run itself."""
+
+    def go_home(self) -> None:
+        """Go back to the run itself."""
+        self.optimum, self.settings, self.away = self._home, settings_of(self.dials), False
 
     def first_order(self, settings: Settings) -> Optimum | None:
         """Return the optimum extrapolated to other settings; nothing is solved.
@@ -62,8 +66,12 @@ class Session:
             }
 
         try:
-            ends = [self.resolver.restored(case_at(self.run.case, self.dials, moved(share)),
-                                            self.optimum.result) for share in (-_STEP, _STEP, 1.0)]
+            ends = [
+                self.resolver.restored(
+                    case_at(self.run.case, self.dials, moved(share)), self.optimum.result
+                )
+                for share in (-_STEP, _STEP, 1.0)
+            ]
         except InputError:  # the end of what is allowed
             return None
         below, above, there = ends
@@ -79,6 +87,9 @@ class Session:
         Raises:
             InputError: If config or patient refuse the numbers.
         """
+        if dict(settings) == settings_of(self.dials):
+            self.go_home()
+            return self.optimum
         case, end = case_at(self.run.case, self.dials, settings), self.optimum
         starts = [start or self.optimum, self._home]
         for begin in starts if self.optimum is not self._home else starts[:1]:

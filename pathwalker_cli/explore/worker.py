@@ -18,6 +18,7 @@ from pathwalker_cli.explore.picture import picture
 from pathwalker_cli.explore.session import Session
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.processes import prepare_worker
+from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.results.run_folder import load_run
 
 _BETTER: Final = 1e-4
@@ -48,11 +49,17 @@ class Worker:
 
     def __init__(self, connection: Connection, folder: Path, places: Path) -> None:
         self._connection, self._places = connection, places
+        self._following: Message | None = None
         self._last: Message = {}
-        self._session = Session(load_run(folder), lambda report: connection.poll())
+        """The last move."""
+        self._session = Session(load_run(folder), self._interrupts)
         page = explore_page(self._session, folder.resolve().name)
         keys = [dial.key for dial in self._session.dials]
         connection.send({"kind": "ready", "page": page, "keys": keys})
+
+    def _interrupts(self, report: ProgressReport) -> bool:
+        """Return whether a solve is to be ended: somebody asks for something else."""
+        return bool(self._last) and self._connection.poll()
 
     def run(self) -> None:
         """Answer until the connection ends."""
@@ -66,9 +73,13 @@ class Worker:
 
     def _next(self) -> Message:
         """Return the next message; of moves in a row only the last one counts."""
-        message = self._connection.recv()
-        while message["kind"] == "move" and self._connection.poll():
-            message = self._connection.recv()
+        message, self._following = self._following or self._connection.recv(), None
+        while message["kind"] == "move" and self._following is None and self._connection.poll():
+            following = self._connection.recv()
+            if following["kind"] == "move":
+                message = following
+            else:
+                self._following = following
         return message
 
     def _try(self, message: Message, act: Callable[[Message], None]) -> None:
@@ -82,7 +93,7 @@ class Worker:
 
     def _move(self, message: Message) -> None:
         """Answer a move to first order, then solved."""
-        settings, began = message["settings"], time.perf_counter()
+        settings, began, self._last = message["settings"], time.perf_counter(), message
         guess = self._session.first_order(settings)
         if guess is not None:
             self._send("first order", message, guess)
@@ -94,11 +105,10 @@ class Worker:
                 f"no walk was found there ({end.result.status}); what is shown is the one before: "
                 "move there in smaller steps"
             )
-        self._last = message
 
     def _get_ready(self) -> None:
         """Use the time in which nobody asks: for the next first order, and for a second look."""
-        if self._connection.poll():
+        if self._following is not None or self._connection.poll():
             return
         _ = self._session.optimum.kkt.factors
         if self._connection.poll() or not self._session.away:

@@ -60,9 +60,7 @@ def prepare_worker() -> None:
     threading.Thread(target=wait_and_end, daemon=True).start()
 
 
-def begun_process(
-    work: Callable[..., None], *arguments: Any
-) -> tuple[SpawnProcess, Connection]:
+def begun_process(work: Callable[..., None], *arguments: Any) -> tuple[SpawnProcess, Connection]:
     """Return a process that does some work, and what to talk to it with.
 
     The work is handed its end of that, then the arguments; it ends with this process.
