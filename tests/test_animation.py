@@ -16,7 +16,8 @@ import pytest
 from click.testing import CliRunner, Result
 from PIL import Image
 
-from helpers import GAIT, stylised_series
+from helpers import GAIT, stylised_series, walker_of
+from made_c3d import motion, write_c3d
 from pathwalker_cli.animation.drawing import (
     Drawing,
     common_view,
@@ -27,6 +28,7 @@ from pathwalker_cli.animation.drawing import (
 from pathwalker_cli.animation.film import film_rate
 from pathwalker_cli.animation.frames import GaitFrames, gait_frames
 from pathwalker_cli.animation.html import html_page
+from pathwalker_cli.animation.recorded import recorded_frames
 from pathwalker_cli.animation.viewer import poses, walker_geometry
 from pathwalker_cli.cli import cli
 from pathwalker_cli.conventions import GENERATORS, SIDES, SUFFIX
@@ -34,6 +36,7 @@ from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
+from pathwalker_cli.stride.stride import body_points
 
 MadeSolution = Callable[..., GaitSolution]
 HOSTILE = "<!--<script><img src=x onerror=alert(1)>"
@@ -285,6 +288,59 @@ def test_hostile_names_stay_text(frames: GaitFrames) -> None:
         assert found.data["runs"][0]["name"] == name
 
 
+# What is recorded
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_c3d(tmp_path_factory.mktemp("c3d") / "walk.c3d")
+
+
+def test_a_recorded_cycle_is_the_one_between_right_strikes(walk: Path) -> None:
+    walker = walker_of("barefoot")
+    behind = recorded_frames(walker, str(walk), 65)
+    (q, paths), rows = motion(), np.arange(50, 115)
+    assert behind.duration == pytest.approx(65 / 120.0)
+    share = np.arange(65) / 65
+    eye = share * (q[115, 0] - q[50, 0])
+    for name in ("hip_r", "toe_l", "neck"):
+        wanted = np.array([body_points(walker, q[row])[name] for row in rows])
+        moved = behind.points[name] - wanted + np.stack([eye, 0 * eye], axis=1)
+        assert np.ptp(moved[:, 0]) < 1e-5, "all points are moved alike"
+        assert np.abs(moved[:, 1]).max() < 1e-5
+    assert behind.points["hip_r"][:, 0].mean() == pytest.approx(0.0, abs=1e-9)
+    assert set(behind.markers) == set(paths)
+    apart = behind.markers["RTOE"] - behind.markers["LTOE"]
+    assert apart == pytest.approx((paths["RTOE"] - paths["LTOE"])[rows][:, [0, 2]], abs=1e-5)
+
+
+def test_a_recording_of_the_patient_is_drawn_behind_in_step(frames: GaitFrames) -> None:
+    behind = recorded_frames(walker_of("orthosis"), "3053138", COUNT)
+    assert not behind.markers
+    heel = behind.points["heel_r"]
+    assert heel[0, 0] == pytest.approx(heel[:, 0].max(), abs=0.03), "it strikes the ground first"
+    plain, both = drawing(frames), drawing(replace(frames, recorded=behind))
+    names = [shape.kind for shape in both.shapes]
+    assert names[: names.index("recorded") + 1] == ["recorded"]
+    assert [kind for kind in names if kind != "recorded"] == [s.kind for s in plain.shapes]
+    hips = both.points["recorded hip_r"][:, 0] - both.points["hip_r"][:, 0]
+    assert abs(hips.mean()) < 1e-9, "both walk before the same eye"
+    assert "recorded, trial 3053138" in html_page([replace(frames, recorded=behind)])
+
+
+def test_animations_show_recordings_and_videos(runs: Path, walk: Path, tmp_path: Path) -> None:
+    page, film = tmp_path / "page.html", tmp_path / "film.gif"
+    video = tmp_path / "the child.mp4"
+    video.write_bytes(b"")
+    options = ("--recorded", walk, "--video", video, "--video-start", 1.5)
+    assert run("animate", runs / "mapd-barefoot", "-o", page, *options).exit_code == 0
+    tags = Tags(page.read_text(encoding="utf-8"))
+    assert tags.data["video"] == {"start": 1.5, "stride": pytest.approx(65 / 120.0)}
+    assert 'src="the%20child.mp4"' in page.read_text(encoding="utf-8")
+    options = ("--recorded", walk, "--fps", 2)
+    assert run("animate", runs / "mapd-barefoot", "-o", film, *options).exit_code == 0
+
+
 # The commands
 
 
@@ -382,6 +438,11 @@ def test_refusals(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert "is not a number" in refusal("animate", bare, "-o", "film.gif", "--slow", "nan")
     for option in ("--strides", "--fps", "--slow"):
         assert f"{option}: is about films" in refusal("animate", bare, "-o", "a.html", option, 2)
+    assert "no orthosis recording" in refusal("animate", worn, "-o", "a.html", "--recorded", "x")
+    assert "no such file" in refusal("animate", worn, "-o", "a.html", "--video", "x.mp4")
+    assert "by pages only" in refusal("animate", worn, "-o", "a.gif", "--video", "x.mp4")
+    assert "no kind of video" in refusal("animate", worn, "-o", "a.html", "--video", "x.avi")
+    assert "of no video" in refusal("animate", worn, "-o", "a.html", "--video-start", 1)
     many = ("--strides", 100, "--slow", 50)
     assert "at most 3000" in refusal("animate", bare, "-o", "film.gif", *many)
     assert [path.name for path in tmp_path.iterdir()] == ["folder.html"]

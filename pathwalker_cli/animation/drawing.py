@@ -14,7 +14,7 @@ from pathwalker_cli.animation.frames import GaitFrames
 from pathwalker_cli.conventions import GENERATORS, SIDES, SUFFIX, Side
 from pathwalker_cli.stride.figures.style import FORCE_LENGTH
 
-Kind = Literal["leg", "foot", "trunk", "head", "muscle", "shell", "spring"]
+Kind = Literal["leg", "foot", "trunk", "head", "muscle", "shell", "spring", "recorded", "marker"]
 
 _LINE: Final = np.array([[0.0, 0.0], [1.0, 0.0]])
 
@@ -41,6 +41,9 @@ _SOLE: Final = (-0.08, 1.0, 0.016, 0.05)
 _COILS: Final = 5
 _COIL_WIDTH: Final = 0.024
 """Zigzags of a drawn spring and their width [m]."""
+
+_DOT: Final = 0.009
+"""Radius of a marker: a little more than those that are worn [m]."""
 
 _SHAFT, _HEAD_WIDTH, _HEAD_LENGTH = 0.012, 0.036, 0.045
 """Size of an arrow [m]; a short arrow has a shorter head."""
@@ -118,10 +121,12 @@ def drawing(frames: GaitFrames) -> Drawing:
     if with_orthosis:
         points |= _spring_ends(frames.points)
     left, right = (_leg(points, side, with_orthosis) for side in ("left", "right"))
+    behind, dots, more = _recorded(frames)
+    points |= more
     return Drawing(
         frames=frames,
         points=points,
-        shapes=(*left, *_trunk(points), *right),
+        shapes=(*behind, *left, *_trunk(points), *right, *dots),
         arrows={side: _arrows(frames, side) for side in SIDES},
     )
 
@@ -131,7 +136,7 @@ def common_view(drawings: Sequence[Drawing]) -> View:
     wide = top = 0.0
     for each in drawings:
         frames = each.frames
-        eye = (frames.middle + frames.cycle * frames.distance)[:, None]
+        eye = frames.eye[:, None]
         placed = (*(p[:, None] for p in each.points.values()), *each.arrows.values())
         wide = max(wide, *(float(np.nanmax(np.abs(p[..., 0] - eye))) for p in placed))
         head, neck = frames.points["head"], frames.points["neck"]
@@ -185,6 +190,33 @@ def _trunk(points: Mapping[str, np.ndarray]) -> tuple[Shape, ...]:
         Shape("head", "neck", "head", circle, closed=True),
         *_muscles(points, ("lumbar",), "", None),
     )
+
+
+def _recorded(frames: GaitFrames) -> tuple[list[Shape], list[Shape], dict[str, np.ndarray]]:
+    """Return a recorded cycle as lines behind the stride, its markers, and the points of both."""
+    lines: list[Shape] = []
+    dots: list[Shape] = []
+    points: dict[str, np.ndarray] = {}
+    if frames.recorded is None:
+        return lines, dots, points
+    eye = np.stack([frames.eye, np.zeros(frames.count)], axis=1)
+    for name, path in frames.recorded.points.items():
+        points[f"recorded {name}"] = path + eye
+    chains: list[tuple[Side | None, tuple[str, ...]]] = [(None, ("lumbar", "neck", "head"))]
+    for side in SIDES:
+        s = SUFFIX[side]
+        foot = (f"ankle_{s}", f"heel_{s}", f"toe_{s}", f"ankle_{s}")
+        chains.append((side, ("lumbar", f"hip_{s}", f"knee_{s}", *foot)))
+    for owner, chain in chains:
+        for a, b in pairwise(chain):
+            lines.append(Shape("recorded", f"recorded {a}", f"recorded {b}", _LINE, side=owner))
+    turn = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]
+    dot = np.stack([np.cos(turn), _DOT * np.sin(turn)], axis=1)
+    for name, path in frames.recorded.markers.items():
+        points[f"marker {name}"] = path + eye
+        points[f"marker {name} above"] = path + eye + [0.0, _DOT]
+        dots.append(Shape("marker", f"marker {name}", f"marker {name} above", dot, closed=True))
+    return lines, dots, points
 
 
 def _muscles(

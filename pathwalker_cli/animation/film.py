@@ -38,11 +38,13 @@ from pathwalker_cli.animation.look import (
     ACTIVATION_COLOURS,
     CAVEAT,
     DASHES,
+    SHADOW_COLOUR,
     SHELL_COLOUR,
     SPRING_COLOUR,
     Look,
     arrow_look,
     pace,
+    recorded_name,
     shape_look,
     subtitle,
 )
@@ -194,6 +196,8 @@ def _figure(drawings: Sequence[Drawing], slow: float) -> tuple[Figure, list[_Pan
         panels.append(_panel(figure.add_axes(place), each, view))
     _legend(figure, drawings, width, height)
     lines = [pace([each.frames for each in drawings]), CAVEAT]
+    if behind := recorded_name([each.frames for each in drawings]):
+        lines.insert(1, f"Behind: {behind}.")
     if abs(slow - 1.0) >= 0.02:
         lines.insert(1, f"The film takes {slow:.2f} times as long as the walk.")
     caption = fill(" ".join(line for line in lines if line), round(15 * width))
@@ -270,6 +274,8 @@ def _legend(figure: Figure, drawings: Sequence[Drawing], width: float, height: f
     if any(each.frames.condition == "orthosis" for each in drawings):
         shell = (SHELL_COLOUR, 0.45)
         handles.append(Patch(facecolor=shell, edgecolor=SPRING_COLOUR, label="orthosis"))
+    if any(each.frames.recorded for each in drawings):
+        handles.append(Line2D([], [], color=SHADOW_COLOUR, linewidth=2, label="recorded"))
     figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 0.4 / height),
                   ncols=len(handles), frameon=False, columnspacing=1.0,
                   handlelength=2.2)  # fmt: skip

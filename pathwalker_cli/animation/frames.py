@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from pathwalker_cli.animation.recorded import RecordedFrames, recorded_frames
 from pathwalker_cli.conventions import SIDES, Condition, Side
 from pathwalker_cli.evaluation.run import run_names, run_notes, stride_of_run
 from pathwalker_cli.model.contact import PHASE_NAMES
@@ -46,6 +47,7 @@ class GaitFrames:
         pressure: Forward position of each centre of pressure [m], shape (n,); NaN likewise.
         activation: Activation of each muscle torque generator, shape (n, 14).
         notes: What to know about it, one sentence each.
+        recorded: A recorded cycle to draw behind it, at the same instants.
     """
 
     name: str
@@ -61,6 +63,7 @@ class GaitFrames:
     pressure: Mapping[Side, np.ndarray]
     activation: np.ndarray
     notes: tuple[str, ...] = ()
+    recorded: RecordedFrames | None = None
 
     @property
     def count(self) -> int:
@@ -82,18 +85,26 @@ class GaitFrames:
         """Mean height of the hips above the ground [m]."""
         return float(self.points["hip_r"][:, 1].mean())
 
+    @property
+    def eye(self) -> np.ndarray:
+        """Where an eye is that moves on evenly before the hips [m], shape (n,)."""
+        return self.middle + self.cycle * self.distance
+
     @cached_property
     def middle(self) -> float:
         """Where an eye that moves on evenly begins, so that the hips stay before it [m]."""
         return float((self.points["hip_r"][:, 0] - self.cycle * self.distance).mean())
 
 
-def run_frames(folders: Sequence[Path], rate: float) -> tuple[GaitFrames, ...]:
+def run_frames(
+    folders: Sequence[Path], rate: float, recorded: str | None = None
+) -> tuple[GaitFrames, ...]:
     """Return the strides of converged runs at the same shares of their gait cycles.
 
     Args:
         folders: The folders that `pathwalker solve` wrote.
         rate: Instants per second of the first stride [1/s].
+        recorded: A trial to draw behind the first stride, see `recorded_frames`.
 
     Raises:
         DataError: If one is no run folder, did not converge, holds no full stride or comes twice.
@@ -102,10 +113,14 @@ def run_frames(folders: Sequence[Path], rate: float) -> tuple[GaitFrames, ...]:
     names = run_names(folders)
     strides = [stride_of_run(folder) for folder in folders]
     count = max(1, round(rate * strides[0][1].duration))
-    return tuple(
+    frames = [
         gait_frames(series, name, run.config.problem, count, run_notes(run))
         for name, (run, series) in zip(names, strides, strict=True)
-    )
+    ]
+    if recorded is not None:
+        behind = recorded_frames(strides[0][1].walker, recorded, count)
+        frames[0] = replace(frames[0], recorded=behind)
+    return tuple(frames)
 
 
 def gait_frames(

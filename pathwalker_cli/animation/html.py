@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import cache
 from typing import Any, Final
 
@@ -29,6 +29,7 @@ from pathwalker_cli.animation.look import (
     SPRING_COLOUR,
     arrow_look,
     pace,
+    recorded_name,
     shape_look,
     subtitle,
 )
@@ -40,21 +41,42 @@ RATE: Final = 100.0
 """Instants of the page per second of gait [1/s]; between them the page interpolates."""
 
 
-def html_page(runs: Sequence[GaitFrames]) -> str:
+@dataclass(frozen=True)
+class Video:
+    """A video of the child that is shown beside the walkers, in step.
+
+    Args:
+        address: Where it is, as a page finds it from its own place.
+        start: When the right heel strikes the ground in it [s].
+    """
+
+    address: str
+    start: float
+
+
+def html_page(runs: Sequence[GaitFrames], video: Video | None = None) -> str:
     """Return the page of one or two strides.
 
     Names of runs come from folders: the template escapes them in text and data alike.
+
+    Args:
+        runs: The strides.
+        video: A video beside them: a stride of it takes as long as the recorded one behind the
+            first walker, or else as that walker's own.
     """
     drawings = [drawing(frames) for frames in runs]
-    view = common_view(drawings)
+    view, first = common_view(drawings), runs[0]
+    stride = first.recorded.duration if first.recorded else first.duration
     return _template().render(
         title=" and ".join(frames.name for frames in runs),
         pace=pace(runs),
-        **walkers_content(drawings, view),
+        video=video,
+        **walkers_content(drawings, view, recorded_name(runs)),
         data={
             "colours": ACTIVATION_COLOURS,
             "half_width": view.half_width,
             "runs": [stride_data(each) for each in drawings],
+            "video": None if video is None else {"start": video.start, "stride": stride},
         },
     )
 
@@ -117,6 +139,8 @@ def _panel(each: Drawing) -> dict[str, Any]:
 def _title(shape: Shape) -> str:
     """Return what a shape stands for, in words."""
     what = shape.kind if shape.generator is None else words(GENERATORS[shape.generator])
+    if shape.kind in ("recorded", "marker"):
+        return shape.start
     if shape.kind in ("leg", "foot"):
         return f"{shape.side} {shape.kind}"
     return f"orthosis, {what}, {shape.side}" if shape.kind in ("shell", "spring") else what

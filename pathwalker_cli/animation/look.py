@@ -47,6 +47,8 @@ _WIDTHS: Final = {
     "muscle": 0.003,
     "shell": 0.004,
     "spring": 0.005,
+    "recorded": 0.009,
+    "marker": 0.002,
 }
 """Line width of each kind of shape [m]."""
 
@@ -75,6 +77,10 @@ def shape_look(shape: Shape) -> Look:
     left = shape.side == "left"
     stroke = BODY_COLOUR[shape.side or "right"]
     width = _WIDTHS[shape.kind]
+    if shape.kind in ("recorded", "marker"):
+        if shape.kind == "marker":
+            return Look("#ffffff", width, False, SHADOW_COLOUR)
+        return Look(SHADOW_COLOUR, width, left)
     if shape.kind in ("shell", "spring"):
         fill = SHELL_COLOUR if shape.kind == "shell" else "none"
         return Look(SPRING_COLOUR, width, left and shape.kind == "shell", fill, 0.45)
@@ -97,6 +103,14 @@ def subtitle(frames: GaitFrames) -> str:
     """Return in one line who walks how fast."""
     walk = f"stride {frames.distance:.2f} m in {frames.duration:.2f} s"
     return f"{who(frames)}: {frames.walking_speed:.2f} m/s, {walk}"
+
+
+def recorded_name(runs: Sequence[GaitFrames]) -> str:
+    """Return what is drawn behind a stride, "" if nothing is."""
+    behind = next((frames.recorded for frames in runs if frames.recorded), None)
+    if behind is None:
+        return ""
+    return f"recorded, trial {behind.name}, in step{'; dots: markers' if behind.markers else ''}"
 
 
 def pace(runs: Sequence[GaitFrames]) -> str:

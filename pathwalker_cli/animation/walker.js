@@ -133,7 +133,23 @@ const gait = (() => {
   const panels = [...document.querySelectorAll(".panel")].map((panel, k) =>
     new Panel(data.runs[k], panel.querySelector("svg.walker"), panel.querySelector(".now")));
 
+  // The video follows the walkers: it plays on its own, and is set right where it has strayed.
+  const video = document.getElementById("video");
+  const STRAYED = 0.1; // [s]
+  function follow() {
+    if (!video || !(video.duration > 0)) return;
+    const { start, stride } = data.video;
+    const wanted = start + at * stride;
+    if (wanted > video.duration) { at = 0; return; }
+    video.playbackRate = Math.min(Math.max((Number(speed.value) * stride) / data.runs[0].duration, 0.07), 10);
+    if (playing === video.paused) { if (playing) video.play(); else video.pause(); }
+    if (Math.abs(video.currentTime - wanted) > (playing ? STRAYED : 0.001)) video.currentTime = wanted;
+  }
+  video?.addEventListener("error", () => { document.getElementById("no-video").hidden = false; });
+  video?.addEventListener("loadedmetadata", follow);
+
   function draw() {
+    follow();
     panels.forEach((panel) => panel.draw());
     const percent = 100 * (at - Math.floor(at));
     slider.value = percent;

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from math import isnan
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from pathwalker_cli.commands.complete import complete_runs
 from pathwalker_cli.commands.options import out_option, runs_argument
+
+if TYPE_CHECKING:
+    from pathwalker_cli.animation.html import Video
 
 
 @click.command("report")
@@ -54,29 +59,57 @@ _PAGE, _FILMS = ".html", (".gif", ".mp4")
     metavar="FACTOR",
     help="How many times as long as the walk a film takes; 1 if left out.",
 )
+@click.option(
+    "--recorded",
+    metavar="TRIAL",
+    help="Draw a recorded gait cycle behind the first run: a C3D file with markers, or the name of "
+    "a recording of the patient.",
+)
+@click.option(
+    "--video",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Show a video of the child beside the walker; a page only, which finds it by its place.",
+)
+@click.option(
+    "--video-start",
+    type=click.FloatRange(0.0, 36000.0),
+    metavar="SECONDS",
+    help="When the right heel strikes the ground in the video; 0 if left out.",
+)
 def animate_command(
-    runs: tuple[Path, ...], out: Path, strides: int | None, fps: int | None, slow: float | None
+    runs: tuple[Path, ...],
+    out: Path,
+    strides: int | None,
+    fps: int | None,
+    slow: float | None,
+    recorded: str | None,
+    video: Path | None,
+    video_start: float | None,
 ) -> None:
     """Draw the walker of one run, or of two side by side, as it walks.
 
     An .html file plays in any browser without a network, at full, half or quarter speed; a .gif or
     .mp4 is a film. MP4 needs ffmpeg: that of the system, or pip install imageio-ffmpeg. Body,
-    ground forces, orthosis and muscle activations are drawn. A run that did not converge is
-    refused.
+    ground forces, orthosis and muscle activations are drawn; a recorded cycle is drawn behind them
+    at the same share of the gait cycle. A run that did not converge is refused.
     """
     from pathwalker_cli.animation.frames import run_frames
 
     _check(runs, out, {"--strides": strides, "--fps": fps, "--slow": slow})
+    _check_video(out, video, video_start)
     if out.suffix.lower() == _PAGE:
         from pathwalker_cli.animation.html import RATE, html_page
         from pathwalker_cli.io.atomic import write_text
 
-        write_text(out, html_page(run_frames(runs, RATE)))
+        beside = _video(video, video_start, out)
+        write_text(out, html_page(run_frames(runs, RATE, recorded), beside))
     else:
         from pathwalker_cli.animation.film import film_rate, write_film
 
         rate = film_rate(out, fps or 25)
-        write_film(out, run_frames(runs, rate * (slow or 1.0)), strides or 1, rate)
+        frames = run_frames(runs, rate * (slow or 1.0), recorded)
+        write_film(out, frames, strides or 1, rate)
     click.echo(f"Written to {out}")
 
 
@@ -102,6 +135,40 @@ def _check(runs: tuple[Path, ...], out: Path, options: dict[str, float | None]) 
             mend=f"leave {given[0]} out",
         )
     check_output(out)
+
+
+_VIDEOS: Final = (".mp4", ".m4v", ".mov", ".webm", ".ogv")
+"""Kinds of videos that browsers show."""
+
+
+def _check_video(out: Path, video: Path | None, start: float | None) -> None:
+    """Refuse a video that no page can show."""
+    from pathwalker_cli.errors import DataError
+
+    if video is None:
+        if start is not None:
+            raise DataError("says when, but of no video", where="--video-start",
+                            mend="add --video FILE")  # fmt: skip
+        return
+    if out.suffix.lower() != _PAGE:
+        raise DataError("is shown by pages only", where=f"--video {video}", allowed=f"with {_PAGE}")
+    if video.suffix.lower() not in _VIDEOS:
+        raise DataError("is no kind of video that browsers show", where=f"--video {video}",
+                        allowed=", ".join(_VIDEOS))  # fmt: skip
+    if not video.is_file():
+        raise DataError("no such file", where=f"--video {video}")
+
+
+def _video(video: Path | None, start: float | None, page: Path) -> Video | None:
+    """Return a video as a page finds it from its own place."""
+    if video is None:
+        return None
+    from urllib.parse import quote
+
+    from pathwalker_cli.animation.html import Video
+
+    place = os.path.relpath(video.resolve(), page.resolve().parent)
+    return Video(quote(place), start or 0.0)
 
 
 @click.command("view")
