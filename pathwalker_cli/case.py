@@ -32,6 +32,10 @@ class Case:
     config: StudyConfig
     unvaried: Patient
 
+    def __repr__(self) -> str:
+        """Return what is solved, and for whom."""
+        return f"Case({self.config.problem!r}, {self.unvaried.id!r})"
+
     @classmethod
     def of(cls, study: StudyConfig | Case) -> Case:
         """Return the case of a config, whose patient is read now; a case stays what it is.
@@ -74,7 +78,13 @@ class Case:
         config, model = self.config, self.config.model
         free = tuple(config.free)
         return build_walker(
-            self.patient, config.condition, model.published, backend, free, model.tissue
+            self.patient,
+            config.condition,
+            model.published,
+            backend,
+            free,
+            model.tissue,
+            model.elements,
         )
 
     def with_values(self, values: Mapping[str, Any], where: str = "") -> Case:

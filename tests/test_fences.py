@@ -182,10 +182,9 @@ def test_every_iteration_is_told_with_its_own_figures() -> None:
 
 def test_a_watcher_ends_the_solve() -> None:
     program, start = textbook(1.3)
-    solver: NlpSolver
 
-    def stop(report: ProgressReport) -> None:
-        solver._watcher.stop = report.iteration == 2
+    def stop(report: ProgressReport) -> bool:
+        return report.iteration == 2
 
     solver = NlpSolver(program, IpoptSettings(), stop)
     result = solver.solve(program, start)

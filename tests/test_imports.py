@@ -16,7 +16,7 @@ PACKAGE = Path(pathwalker_cli.__file__).parent
 ROOT = "pathwalker_cli"
 
 LAYERS = (
-    {"errors", "paths"},
+    {"errors", "paths", "installed"},
     {"nlp"},
     {"ocp"},
     {"versions", "model.choices", "model.skeleton"},
@@ -33,6 +33,7 @@ LAYERS = (
     {"case"},
     {"stride"},
     {"gait", "inverse", "ocp.solve"},
+    {"extensions"},
     {"results"},
     {"evaluation"},
     {"studies"},

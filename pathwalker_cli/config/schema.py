@@ -9,8 +9,9 @@ from pydantic import AfterValidator, BeforeValidator, Field, field_validator, mo
 
 from pathwalker_cli.config.learnt import Learnt
 from pathwalker_cli.conventions import ANGLES, STIFFNESSES, Condition
-from pathwalker_cli.errors import did_you_mean
-from pathwalker_cli.gait.costs import GOALS, Costs
+from pathwalker_cli.errors import ConfigError, did_you_mean
+from pathwalker_cli.gait.costs import ELSEWHERE, GOALS, Costs
+from pathwalker_cli.installed import load_installed
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.patient.blocks import Stiffness
@@ -49,12 +50,14 @@ Amount = Annotated[float, Quantity("SI units", -1000.0, 1000.0)]
 AmountRange = Annotated[tuple[Amount, Amount], AS_TUPLE, BeforeValidator(_no_number), ORDERED]
 
 
-def _keys_of(allowed: Collection[str]) -> AfterValidator:
+def _keys_of(allowed: Collection[str], elsewhere: Collection[str] = ()) -> AfterValidator:
     """Return what refuses a mapping with other keys than these."""
 
     def check(value: dict[str, Any]) -> dict[str, Any]:
         for name in value:
             if name not in allowed:
+                load_installed()
+            if name not in allowed and name not in elsewhere:
                 known = ", ".join(allowed)
                 raise invalid(f"names '{name}'", allowed=known, mend=did_you_mean(name, allowed))
         return value
@@ -79,6 +82,7 @@ class ModelConfig(YamlModel):
     backend: Literal["auto", "pinocchio.casadi", "compiled", "direct"] = "auto"
     published: bool = False
     tissue: bool = False
+    elements: Annotated[tuple[str, ...], AS_TUPLE] = ()
 
 
 class CostConfig(YamlModel):
@@ -91,7 +95,7 @@ class CostConfig(YamlModel):
     fit_weight: Weight = 1.0
     excitation_weight: Weight = 1e-4
     activation_power: Annotated[int, Field(ge=2, le=10)] = 2
-    goals: Annotated[dict[str, Weight], _keys_of(GOALS)] = Field(default_factory=dict)
+    goals: Annotated[dict[str, Weight], _keys_of(GOALS, ELSEWHERE)] = Field(default_factory=dict)
     comfort_ranges: RangeByAngle = Field(default_factory=dict)
     trunk_lean: Angle = 0.0
 
@@ -111,9 +115,24 @@ class CostConfig(YamlModel):
         return {**own, **self.goals}
 
     @property
+    def weighed(self) -> tuple[str, ...]:
+        """The goals that have a weight, known ones first."""
+        return tuple(name for name in {**GOALS, **self.goals} if self.goals.get(name, 0.0) > 0.0)
+
+    @property
     def wanted(self) -> Costs:
-        """The goals that have a weight, and what they need."""
-        names = tuple(name for name in GOALS if self.goals.get(name, 0.0) > 0.0)
+        """The goals that have a weight, and what they need.
+
+        Raises:
+            ConfigError: If nothing has registered one of them.
+        """
+        names = self.weighed
+        if names and names[-1] not in GOALS:
+            raise ConfigError(
+                f"weighs '{names[-1]}', which nothing has registered",
+                where="cost.goals",
+                mend="import what registers it first, or install its package",
+            )
         return Costs(names, self.activation_power, self.comfort_ranges, self.trunk_lean)
 
 
@@ -258,13 +277,13 @@ class StudyConfig(YamlModel):
 
     @model_validator(mode="after")
     def _goals_that_suit(self) -> StudyConfig:
-        names = self.cost.wanted.names
+        names = self.cost.weighed
         if self.fits and names:
             raise invalid(
                 f"asks for the goal '{names[0]}', but {self.problem} follows a recording",
                 mend="leave cost.goals out",
             )
-        whole = [name for name in names if GOALS[name].whole_stride]
+        whole = [name for name in names if name in GOALS and GOALS[name].whole_stride]
         if self.half_cycle and whole:
             raise invalid(
                 f"asks half a cycle for the goal '{whole[0]}': it is symmetric already",

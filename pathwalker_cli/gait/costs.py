@@ -300,6 +300,12 @@ GOALS: Final[dict[str, CostTerm]] = {
 }  # fmt: skip
 """All goals by the name that configs and results use."""
 
+SHIPPED: Final = frozenset(GOALS)
+"""Those that come with this package: derivatives of others are not kept on disk."""
+
+ELSEWHERE: Final[set[str]] = set()
+"""Goals of runs that were read, which nothing here has registered: their configs can be read."""
+
 
 @dataclass(frozen=True)
 class Costs:

@@ -22,9 +22,9 @@ import pinocchio as pin
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.boundary import gait_boundary
-from pathwalker_cli.gait.costs import Costs, Instant, Weights
+from pathwalker_cli.gait.costs import SHIPPED, Costs, Instant, Weights
 from pathwalker_cli.model.contact import FORCES, PHASES, ContactForce, ContactPhase
-from pathwalker_cli.model.elements import element_forces, generalised_forces
+from pathwalker_cli.model.elements import REGISTERED, element_forces, generalised_forces
 from pathwalker_cli.model.elements.muscle import (
     ACTIVATION_TIME,
     DEACTIVATION_TIME,
@@ -142,6 +142,14 @@ class GaitProblem:
         names, free = tuple(body.parameter_names), self.walker.unknowns
         parts = tuple((type(e).__name__, e.name) for e in self.walker.elements)
         return self.form, body.backend, body.topology, names, parts, free, self.costs.structure
+
+    @property
+    def shipped(self) -> bool:
+        """Whether all of it comes with this package: the structure tells nothing of other code."""
+        others = {element.name for parts in REGISTERED.values() for element in parts}
+        return SHIPPED.issuperset(self.costs.names) and not others.intersection(
+            element.name for element in self.walker.elements
+        )
 
     def build(self) -> MultiPhaseProblem:
         """Return the problem's structure."""
@@ -362,9 +370,9 @@ def gait_blocks(gait: GaitProblem, degree: int) -> CollocationBlocks:
     """
     key = (gait.structure, degree)
     if key not in _BUILT:
-        kept = None if kernels() is None else kept_tapes(key, _MAKERS)
+        kept = kept_tapes(key, _MAKERS) if kernels() is not None and gait.shipped else None
         _BUILT[key] = CollocationBlocks(gait.build(), degree, kept)
-        if kept is None:
+        if kept is None and gait.shipped:
             _keep(_BUILT[key], key)
     return _BUILT[key]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.errors import NotConvergedError
+from pathwalker_cli.errors import InputError, NotConvergedError
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.bounds import GaitBounds
 from pathwalker_cli.model.walker import Walker
@@ -18,6 +18,9 @@ from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.verify import Reintegration, second_engine_residual
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TOO_WEAK: Final = "the muscles are too weak for a walk within the bounds"
 """Status of a solve that ended in which torques are lacking."""
@@ -168,6 +171,29 @@ class GaitSolution:
     seconds: dict[str, float]
     optima: tuple[LocalOptimum, ...] = ()
     shortfall: Shortfall | None = None
+
+    def __repr__(self) -> str:
+        """Return what was solved, and how it ended."""
+        return f"GaitSolution({self.case!r}, {self.status!r}, cost {self.cost:.5g})"
+
+    def plot(self, figure: str = "joint_angles") -> Figure:
+        """Return a figure of the solution, which need not be saved anywhere.
+
+        Args:
+            figure: "joint_angles", "joint_moments", "ground_forces", "activations",
+                "stick_figures", "ankle_torque" or "orthosis_curves".
+
+        Raises:
+            NotConvergedError: If it did not converge.
+            InputError: If there is no such figure.
+        """
+        from pathwalker_cli.stride.figures.save import figure_names, make_figure
+
+        series = self.series
+        names = figure_names(series)
+        if figure not in names:
+            raise InputError(f"there is no figure {figure!r} of it", allowed=", ".join(names))
+        return make_figure(figure, series)
 
     @property
     def config(self) -> StudyConfig:

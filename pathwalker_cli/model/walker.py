@@ -17,7 +17,13 @@ from pathwalker_cli.model.backends import rigid_body_functions
 from pathwalker_cli.model.backends.functions import RigidBodyFunctions
 from pathwalker_cli.model.contact import ContactPhase, phase_named
 from pathwalker_cli.model.devices import DEVICES, Device
-from pathwalker_cli.model.elements import ForceElement, State, element_forces, generalised_forces
+from pathwalker_cli.model.elements import (
+    ForceElement,
+    State,
+    element_forces,
+    generalised_forces,
+    registered_elements,
+)
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
 from pathwalker_cli.model.elements.orthosis import OrthosisSide
 from pathwalker_cli.model.elements.tissue import leg_tissue
@@ -59,6 +65,10 @@ class Walker:
     values: Mapping[str, float]
     unknowns: tuple[Unknown, ...] = ()
     published: bool = False
+
+    def __repr__(self) -> str:
+        """Return who walks, and with what."""
+        return f"Walker({self.patient.id!r}, {self.condition!r}, {self.total_mass:.1f} kg)"
 
     @property
     def backend(self) -> str:
@@ -313,6 +323,7 @@ def build_walker(
     backend: str = "auto",
     free: Sequence[str] = (),
     tissue: bool = False,
+    elements: Sequence[str] = (),
 ) -> Walker:
     """Return the walking model of a patient.
 
@@ -323,6 +334,7 @@ def build_walker(
         backend: Dynamics back end, see `model.backends`.
         free: Addresses of numbers that a problem may choose, beside those that it looks for anyway.
         tissue: Whether joints have passive torques.
+        elements: Names of further force elements, see `extensions`.
 
     Raises:
         InputError: If the condition does not exist.
@@ -337,7 +349,8 @@ def build_walker(
     if device.worn:
         patient.require_orthosis()
     model = pinocchio_model(patient, condition, published)
-    numbers = _numbers((*_MUSCLES, *_passive(tissue), *device.forces), device)
+    passive = _passive(tissue, elements)
+    numbers = _numbers((*_MUSCLES, *passive, *device.forces), device)
     values = {n.address: n.value_for(patient) for n in numbers}
     return Walker(
         patient=patient,
@@ -346,10 +359,10 @@ def build_walker(
         model=model,
         rigid_body=rigid_body_functions(model, CONTACT_POINTS, backend),
         muscles=_MUSCLES,
-        tissue=_passive(tissue),
+        tissue=passive,
         device=device,
         values=values,
-        unknowns=unknowns_of(condition, free, tissue),
+        unknowns=unknowns_of(condition, free, tissue, elements),
         published=published,
     )
 
@@ -360,12 +373,15 @@ def _numbers(elements: Sequence[ForceElement], device: Device) -> tuple[Number, 
     return (*of_elements, *device.added_mass.values())
 
 
-def _passive(tissue: bool) -> tuple[ForceElement, ...]:
-    return _TISSUE if tissue else ()
+def _passive(tissue: bool, elements: Sequence[str]) -> tuple[ForceElement, ...]:
+    return (*(_TISSUE if tissue else ()), *registered_elements(elements))
 
 
 def unknowns_of(
-    condition: Condition, free: Sequence[str] = (), tissue: bool = False
+    condition: Condition,
+    free: Sequence[str] = (),
+    tissue: bool = False,
+    elements: Sequence[str] = (),
 ) -> tuple[Unknown, ...]:
     """Return what a problem chooses: what is asked for, and what a device is identified by.
 
@@ -376,12 +392,13 @@ def unknowns_of(
         condition: "barefoot" or "orthosis".
         free: Addresses of numbers that are asked for.
         tissue: Whether joints have passive torques.
+        elements: Names of further force elements.
 
     Raises:
         ConfigError: If there is no such number.
     """
     device = DEVICES[condition]
-    numbers = _numbers((*_MUSCLES, *_passive(tissue), *device.forces), device)
+    numbers = _numbers((*_MUSCLES, *_passive(tissue, elements), *device.forces), device)
     asked = unknowns_at(free, numbers)
     taken = {address for unknown in asked for address in unknown.addresses}
     usual = [

@@ -87,7 +87,8 @@ class Watcher(ca.Callback):
             worst = float(np.maximum(self._lower - g, g - self._upper).max(initial=0.0))
             elapsed = time.perf_counter() - self._start
             report = ProgressReport(self.iteration, float(given["f"]), worst, elapsed)
-            self.stop |= bool(self._observer(report))
+            if self._observer(report):
+                self.stop = True
         return [int(self.stop)]
 
 

@@ -83,6 +83,10 @@ class Patient(YamlModel):
     _origin: _Origin = PrivateAttr(default=_Origin())
     _changes: tuple[str, ...] = PrivateAttr(default=())
 
+    def __repr__(self) -> str:
+        """Return who it is."""
+        return f"Patient({self.id!r}, {self.age:g} years, {self.body_mass:g} kg)"
+
     @field_validator("id")
     @classmethod
     def _safe(cls, value: str) -> str:

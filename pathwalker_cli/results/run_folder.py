@@ -18,6 +18,7 @@ import numpy as np
 from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.gait.costs import ELSEWHERE, GOALS
 from pathwalker_cli.gait.recorded import start_recording
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.inverse.figures import recorded_reference
@@ -291,10 +292,12 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
     if (folder / _MULTIPLIERS).exists():
         multipliers = read_multipliers(folder / _MULTIPLIERS)
         _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
+    ELSEWHERE.update(metrics.get("goals", {}).keys() - GOALS.keys())
     case = _kept_case(folder)
     config = case.config
-    expected = len(unknowns_of(config.condition, tuple(config.free), config.model.tissue))
-    if config.problem != metrics["problem"] or motion.parameters.size != expected:
+    model = config.model
+    unknowns = unknowns_of(config.condition, tuple(config.free), model.tissue, model.elements)
+    if config.problem != metrics["problem"] or motion.parameters.size != len(unknowns):
         where = str(folder / CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)
     return Run(folder, metrics, motion, case, multipliers)

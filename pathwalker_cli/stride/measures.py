@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, ROOT, SIDES, SUFFIX, Side
+from pathwalker_cli.installed import load_installed
 from pathwalker_cli.stride.measure import (
     ANKLE,
     EFFORT,
@@ -289,6 +290,7 @@ def measures_in(table: str) -> tuple[Measure, ...]:
     Args:
         table: One of `TABLES`; those of "evaluate" and "report" have their keys beside recordings.
     """
+    load_installed()
     named = [key for key in TABLES[table] for key in expanded(key)]
     elsewhere = {key for keys in TABLES.values() for name in keys for key in expanded(name)}
     further = [m.key for m in REGISTRY if m.shown and m.key not in elsewhere]
@@ -313,6 +315,7 @@ def metrics_of(stride: Stride) -> dict[str, Any]:
 
     Values per phase, coordinate or generator stay together under one key.
     """
+    load_installed()
     return {m.key: m.of(stride) for m in REGISTRY if m.kept and m.value is not None}
 
 

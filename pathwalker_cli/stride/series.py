@@ -73,6 +73,11 @@ class GaitSeries(Sampled):
     reserve: np.ndarray
     element_force: np.ndarray
 
+    def __repr__(self) -> str:
+        """Return who walks how far, and how finely it was sampled."""
+        walk = f"{self.distance:.2f} m in {self.duration:.2f} s"
+        return f"GaitSeries({self.walker!r}, {walk}, {len(self.time)} instants)"
+
     @cached_property
     def excitation(self) -> np.ndarray:
         """Neural excitations in [0, 1], shape (n, 14), from equation (2)."""

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
+from pathwalker_cli.errors import ConfigError
+from pathwalker_cli.installed import load_installed
 from pathwalker_cli.model.numbers import Number
 
 Curve = Callable[..., Any]
@@ -59,6 +61,29 @@ class ForceElement(Protocol):
 
         `numbers` are values by address; `curve` evaluates what is costly to differentiate.
         """
+
+
+REGISTERED: Final[dict[str, tuple[ForceElement, ...]]] = {}
+"""Elements from outside by the name that configs call them, see `extensions`."""
+
+
+def registered_elements(names: Iterable[str]) -> tuple[ForceElement, ...]:
+    """Return the elements that were registered by these names.
+
+    Raises:
+        ConfigError: If nothing has registered one of them.
+    """
+    for name in names:
+        if name not in REGISTERED:
+            load_installed()
+        if name not in REGISTERED:
+            raise ConfigError(
+                f"names '{name}', which nothing has registered",
+                where="model.elements",
+                allowed=", ".join(REGISTERED) or "none: nothing has registered any",
+                mend="import what registers it first, or install its package",
+            )
+    return tuple(element for name in names for element in REGISTERED[name])
 
 
 def element_forces(
