@@ -12,7 +12,7 @@ from pathwalker_cli.conventions import ANGLES, STIFFNESSES, Condition
 from pathwalker_cli.errors import did_you_mean
 from pathwalker_cli.gait.costs import GOALS, Costs
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
-from pathwalker_cli.model.contact import PHASE_NAMES
+from pathwalker_cli.model.contact import PHASE_NAMES, Feet
 from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.patient.variation import Variation
 from pathwalker_cli.problems import PROBLEMS
@@ -79,6 +79,7 @@ class ModelConfig(YamlModel):
     backend: Literal["auto", "pinocchio.casadi", "compiled", "direct"] = "auto"
     published: bool = False
     tissue: bool = False
+    feet: Feet = "points"
 
 
 class CostConfig(YamlModel):

@@ -25,7 +25,7 @@ def asymmetries(walker: Walker) -> list[str]:
     bias, swapped = (pin.nonLinearEffects(model, model.createData(), k, k) for k in (q, q[order]))
     alike = {
         "strengths": np.allclose(strengths, strengths[mirror_permutation(GENERATORS)]),
-        "contact points": np.allclose(right, left),
+        "contact points": np.allclose(right, left) and np.allclose(*np.split(walker.radii, 2)),
         "masses or lengths": np.allclose(bias, swapped[order], rtol=1e-9, atol=1e-9),
         "orthoses": walker.orthosis is None or walker.orthosis[0] == walker.orthosis[1],
     }

@@ -7,15 +7,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
 
 from pathwalker_cli.errors import InputError
+from pathwalker_cli.model.choices import ROCKER_SHARES
+from pathwalker_cli.model.numbers import Number
 from pathwalker_cli.model.skeleton import SIDES, SUFFIX, Side
+
+if TYPE_CHECKING:
+    from pathwalker_cli.patient import Patient
+
+Feet = Literal["points", "rockers"]
+"""What feet touch the ground with: points, or circles that roll without slipping."""
 
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """A point of a foot that may stand on the ground.
+    """A point of a foot that may stand on the ground, or the circle that touches it there.
+
+    With the sole level the circle touches the ground at the point, its centre above it.
 
     Args:
         place: Where on the foot.
@@ -34,6 +46,19 @@ class ContactPoint:
     def link(self) -> str:
         """The link that carries it."""
         return f"foot_{SUFFIX[self.side]}"
+
+    @cached_property
+    def radius(self) -> Number:
+        """Radius of the circle [m]."""
+
+        def by_length(patient: Patient) -> float:
+            return ROCKER_SHARES[self.place] * patient.length("foot", self.side)
+
+        return Number(
+            f"rocker_radius.{self.place}.{self.side}", f"{self.place}_radius",
+            f"radius of the {self.place} rocker", "m", self.side, by_length,
+            "share of the length of the foot, see model.choices",
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -62,6 +87,16 @@ class ContactForce:
     def index(self) -> int:
         """Its position in `FORCES`."""
         return FORCES.index(self)
+
+
+def lowest(rotation: np.ndarray, radius: float) -> np.ndarray:
+    """Return where a circle touches the ground, from its contact point [m], shape (3,).
+
+    Args:
+        rotation: Rotation of the foot in the world, shape (3, 3).
+        radius: Radius of the circle [m].
+    """
+    return radius * (np.asarray(rotation)[:, 2] - (0.0, 0.0, 1.0))
 
 
 POINTS: Final = tuple(ContactPoint(place, side) for side in SIDES for place in ("heel", "toe"))

@@ -25,6 +25,7 @@ from pathwalker_cli.patient.blocks import (
     FootPoints,
     OrthosisData,
     Recorded,
+    RockerRadius,
     SegmentLengths,
     Strengths,
 )
@@ -73,6 +74,7 @@ class Patient(YamlModel):
     height: Annotated[float, Quantity("m", 0.5, 2.2, above="is it in centimetres?")]
     segment_lengths: SegmentLengths = SegmentLengths()
     contact_points: ContactPoints = ContactPoints()
+    rocker_radius: RockerRadius = RockerRadius()
     strengths: Strengths | None = None
     examination: Examination = Examination()
     orthosis: OrthosisData | None = None

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from pathwalker_cli.conventions import CONTACT_POINTS
+from pathwalker_cli.model.contact import lowest
 from pathwalker_cli.stride.series import GaitSeries
 
 
@@ -106,7 +107,7 @@ class _State:
     @staticmethod
     def of(series: GaitSeries, k: int, data: pin.Data) -> _State:
         """Return the state of an instant; `data` is where Pinocchio computes."""
-        model = series.walker.model
+        model, radii = series.walker.model, series.walker.radii
         q, v = np.array(series.q[k]), np.array(series.v[k])
         energy = pin.computeKineticEnergy(model, data, q, v)
         energy += pin.computePotentialEnergy(model, data, q)
@@ -121,8 +122,10 @@ class _State:
         pin.updateFramePlacements(model, data)
         for i, point in enumerate(CONTACT_POINTS):
             frame = model.getFrameId(point)
-            place = np.array(data.oMf[frame].translation)
-            speed = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
+            motion = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+            low = lowest(data.oMf[frame].rotation, radii[i])
+            place = np.array(data.oMf[frame].translation) + low
+            speed = motion.linear + np.cross(motion.angular, low)
             fx, fz = series.force[k, 2 * i : 2 * i + 2]
             load = np.array([fx, 0.0, fz])
             force += load

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
 
-from pathwalker_cli.model.contact import POINTS
+from pathwalker_cli.model.contact import POINTS, lowest
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.taped import Columns
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
@@ -114,10 +114,11 @@ def second_engine_residual(series: GaitSeries) -> float:
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
         for i, point in enumerate(POINTS):
-            jacobian = pin.getFrameJacobian(
-                model, data, model.getFrameId(point.name), pin.LOCAL_WORLD_ALIGNED
-            )
-            needed = needed - jacobian[[0, 2]].T @ series.force[k, 2 * i : 2 * i + 2]
+            frame = model.getFrameId(point.name)
+            jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+            forward, _, upward = lowest(data.oMf[frame].rotation, walker.radii[i])
+            rows = jacobian[[0, 2]] + np.outer((upward, -forward), jacobian[4])
+            needed = needed - rows.T @ series.force[k, 2 * i : 2 * i + 2]
         worst = max(worst, float(np.abs(needed - given[k]).max()))
     return worst
 

@@ -23,6 +23,7 @@ from pathwalker_cli.model.backends.functions import (
     Topology,
     all_parameters,
     fold,
+    rolling,
 )
 
 _MODULES = MappingProxyType({"pinocchio.casadi": bindings, "compiled": compiled, "direct": direct})
@@ -58,7 +59,10 @@ def available_backends() -> tuple[str, ...]:
 
 
 def rigid_body_functions(
-    model: pin.Model, points: Sequence[str], backend: str = "auto"
+    model: pin.Model,
+    points: Sequence[str],
+    backend: str = "auto",
+    radii: Sequence[float] | np.ndarray = (),
 ) -> RigidBodyFunctions:
     """Build the symbolic dynamics and kinematics of a planar model.
 
@@ -69,6 +73,7 @@ def rigid_body_functions(
         model: Model in the x-z plane of revolute and prismatic joints along the axes.
         points: Names of the frames whose motion is wanted, e.g. contact points.
         backend: One of `BACKENDS`, or "auto" for the first one available.
+        radii: Radius of the circle on which each point rolls [m]; none: all are 0.
 
     Raises:
         BackendError: The back end does not exist or cannot be used here, or the model has joints
@@ -79,7 +84,7 @@ def rigid_body_functions(
         allowed = ", ".join(("auto", *available_backends()))
         raise BackendError(f"there is no back end {name!r}; available: {allowed}")
     topology = Topology.of(model, points)
-    parameters = all_parameters(model, points)
+    parameters = all_parameters(model, points, radii)
     nonzero = tuple((parameters != 0.0).tolist())
     values = parameters[np.array(nonzero, dtype=bool)]
     values.setflags(write=False)
@@ -104,7 +109,8 @@ def _folded(
         raise BackendError(
             f"back end {name!r} is not available: {report.detail}; or use one of auto, {others}"
         )
-    return MappingProxyType(fold(topology, _MODULES[name].build(topology), nonzero))
+    full = rolling(topology, _MODULES[name].build(topology))
+    return MappingProxyType(fold(topology, full, nonzero))
 
 
 def _report(name: str) -> BackendReport:

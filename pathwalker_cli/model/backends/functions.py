@@ -47,6 +47,9 @@ of mass [m] and inertia about it [kg m^2] of the body it moves, in the axes of t
 POINT_ENTRIES = tuple(f"position.{axis}" for axis in "xyz")
 """Parameters of a point, in order: its position in the frame of its joint [m]."""
 
+RADIUS = "radius"
+"""Last parameter of a point, behind those of all others: radius of its circle [m]."""
+
 
 @dataclass(frozen=True)
 class Topology:
@@ -104,11 +107,26 @@ class Topology:
         )
 
     @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Names of all parameters in order, e.g. "hip_r.placement.z" or "heel_r.position.x"."""
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the parameters that a back end knows, e.g. "hip_r.mass", "heel_r.position.x"."""
         of_joints = (f"{joint}.{entry}" for joint in self.joints for entry in JOINT_ENTRIES)
         of_points = (f"{point}.{entry}" for point in self.points for entry in POINT_ENTRIES)
         return (*of_joints, *of_points)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of all parameters in order: `body_names`, then radii, e.g. "heel_r.radius"."""
+        return (*self.body_names, *(f"{point}.{RADIUS}" for point in self.points))
+
+    @property
+    def turns(self) -> np.ndarray:
+        """Which hinges about y turn the body of each point: entries 0 and 1, shape (n, nq)."""
+        matrix = np.zeros((len(self.points), len(self.joints)))
+        for row, joint in zip(matrix, self.point_joints, strict=True):
+            while joint:
+                row[joint - 1] = self.types[joint - 1] == "RY"
+                joint = self.parents[joint - 1]
+        return matrix
 
     @property
     def n_root_translations(self) -> int:
@@ -121,8 +139,10 @@ class Topology:
         return count
 
 
-def all_parameters(model: pin.Model, points: Sequence[str]) -> np.ndarray:
-    """Return the values of `Topology.parameter_names`, zeros included."""
+def all_parameters(
+    model: pin.Model, points: Sequence[str], radii: Sequence[float] | np.ndarray = ()
+) -> np.ndarray:
+    """Return the values of `Topology.parameter_names`, zeros included; no radii: all are 0."""
     symmetric = ((0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2))
     values = [
         np.concatenate(
@@ -131,7 +151,7 @@ def all_parameters(model: pin.Model, points: Sequence[str]) -> np.ndarray:
         for placement, body in zip(model.jointPlacements[1:], model.inertias[1:], strict=True)
     ]
     values += [_frame(model, point).placement.translation for point in points]
-    return np.concatenate(values)
+    return np.concatenate([*values, radii if len(radii) else np.zeros(len(points))])
 
 
 def _frame(model: pin.Model, name: str) -> pin.Frame:
@@ -147,7 +167,8 @@ class RigidBodyFunctions:
 
     Arguments are generalised coordinates `q` [m, rad], velocities `v` [m/s, rad/s], accelerations
     `vdot` [m/s^2, rad/s^2], each of shape (nq,), and model parameters `theta`.  Quantities of
-    points are in world axes, x and z per point, stacked: shape (2 n,).
+    points are in world axes, x and z per point, stacked: shape (2 n,).  A point with a radius is
+    what does not move while its circle rolls on level ground, see `rolling`.
 
     Attributes:
         backend: Name of the back end that built the functions.
@@ -179,8 +200,10 @@ class RigidBodyFunctions:
     parameter_names: tuple[str, ...]
     topology: Topology
 
-    def parameters_for(self, model: pin.Model) -> np.ndarray:
-        """Return the values of `theta` for another model of the same topology.
+    def parameters_for(
+        self, model: pin.Model, radii: Sequence[float] | np.ndarray = ()
+    ) -> np.ndarray:
+        """Return the values of `theta` for another model of the same topology, with these radii.
 
         Raises:
             BackendError: The topology differs, or the model needs an entry that is folded away.
@@ -190,23 +213,29 @@ class RigidBodyFunctions:
                 "the model has other joints, parents, rotations or gravity than the one the "
                 "functions were built from; build functions for it with rigid_body_functions()"
             )
-        return parameters_of(model, self.topology.points, self.parameter_names)
+        return parameters_of(model, self.topology.points, self.parameter_names, radii)
 
 
-def parameters_of(model: pin.Model, points: Sequence[str], names: Sequence[str]) -> np.ndarray:
+def parameters_of(
+    model: pin.Model,
+    points: Sequence[str],
+    names: Sequence[str],
+    radii: Sequence[float] | np.ndarray = (),
+) -> np.ndarray:
     """Return the named parameters of a model, shape (len(names),), read-only.
 
     Args:
         model: Model of the topology the names were made for.
         points: Names of the point frames.
         names: Names of parameters, see `RigidBodyFunctions.parameter_names`.
+        radii: Radii of the points [m]; none: all are 0.
 
     Raises:
         BackendError: A name does not exist, or a parameter that is not named is not zero: the
             functions that go with the names take it for zero.
     """
     known = Topology.of(model, points).parameter_names
-    values = dict(zip(known, all_parameters(model, points).tolist(), strict=True))
+    values = dict(zip(known, all_parameters(model, points, radii).tolist(), strict=True))
     if unknown := [name for name in names if name not in values]:
         raise BackendError(f"the model has no parameter {', '.join(unknown)}")
     named = set(names)
@@ -217,6 +246,49 @@ def parameters_of(model: pin.Model, points: Sequence[str], names: Sequence[str])
         )
     result = np.array([values[name] for name in names])
     result.setflags(write=False)
+    return result
+
+
+def rolling(topology: Topology, fixed: Mapping[str, ca.Function]) -> dict[str, ca.Function]:
+    """Let every point roll on a circle that is fixed to its body and touches the ground there.
+
+    With the turn `t` of the body about +y, of speed w, the centre of a circle of radius r stands
+    r (sin t, cos t) from the point.  It rolls without slipping while the forward speed of its
+    centre is r w, and touches the ground at height 0 where the centre is at height r: what stays
+    is the point plus r (sin t - t, cos t - 1).  Without radius that is the point itself.
+
+    Args:
+        topology: Topology of the model; frames of joints are parallel where all angles are 0.
+        fixed: The functions of `SIGNATURES` with `theta` as in `Topology.body_names`.
+
+    Returns:
+        The same with `theta` as in `Topology.parameter_names`.
+    """
+    nq, count = len(topology.joints), len(topology.body_names)
+    symbols = {name: ca.SX.sym(name, nq) for name in ("q", "v", "vdot")}
+    symbols["theta"] = ca.SX.sym("theta", len(topology.parameter_names))
+    body = {**symbols, "theta": symbols["theta"][:count]}
+    radius, turns = symbols["theta"][count:], ca.SX(ca.sparsify(ca.DM(topology.turns)))
+    turn, speed, change = (turns @ symbols[name] for name in ("q", "v", "vdot"))
+    sine, cosine = radius * ca.sin(turn), radius * (ca.cos(turn) - 1.0)
+    rolled = {
+        "point_positions": (sine - radius * turn, cosine),
+        "point_velocities": (cosine * speed, -sine * speed),
+        "point_accelerations": (
+            cosine * change - sine * speed**2,
+            -sine * change - (cosine + radius) * speed**2,
+        ),
+        "point_jacobian": tuple(
+            ca.repmat(factor, 1, nq) * turns for factor in (cosine, -sine)
+        ),
+    }  # fmt: skip
+    result = {}
+    for name, arguments in SIGNATURES.items():
+        value = fixed[name](*(body[argument] for argument in arguments))
+        if name in rolled and topology.points:
+            pairs = zip(*(ca.vertsplit(rows) for rows in rolled[name]), strict=True)
+            value += ca.vertcat(*(row for pair in pairs for row in pair))
+        result[name] = ca.Function(name, [symbols[argument] for argument in arguments], [value])
     return result
 
 
