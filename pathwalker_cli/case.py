@@ -66,7 +66,7 @@ class Case:
         from pathwalker_cli.model.parts import Parts  # takes long: only who needs it
 
         model = self.config.model
-        return Parts(self.config.condition, model.tissue, model.feet)
+        return Parts(self.config.condition, model.tissue, model.feet, model.uses)
 
     def walker(self, backend: str = "auto") -> Walker:
         """Return the walking model of the patient in the condition of the problem.

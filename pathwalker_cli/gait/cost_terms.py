@@ -92,7 +92,8 @@ def _squared_distance(motion: PhasedMotion, samples: tuple[Sample, ...]) -> floa
 
 def _totals(motion: PhasedMotion, integrals: Mapping[str, float]) -> Totals:
     durations = [phase.duration for phase in motion.phases]
-    return Totals(integrals, walked_distance(motion), motion.duration, durations)
+    phases = [phase_named(phase.name) for phase in motion.phases]
+    return Totals(integrals, walked_distance(motion), motion.duration, durations, phases)
 
 
 def _goal_gains(phase: PhaseMotion, costs: Costs, weight: float) -> np.ndarray:

@@ -15,7 +15,8 @@ import numpy as np
 
 from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, LEG_JOINTS, SUFFIX
 from pathwalker_cli.gait import choices
-from pathwalker_cli.model.contact import PHASES, ContactPhase
+from pathwalker_cli.model.contact import ContactPhase
+from pathwalker_cli.model.skeleton import SIDES
 
 Weights = Mapping[str, float]
 """Weight of every term by its name; what is missing counts nothing."""
@@ -61,7 +62,7 @@ class Instant:
     @property
     def first_step(self) -> bool:
         """Whether the phase belongs to the first half of the stride."""
-        return PHASES.index(self.phase) < len(PHASES) // 2
+        return self.phase.step == SIDES[0]
 
     @property
     def vertical_force(self) -> dict[str, Any]:
@@ -82,13 +83,15 @@ class Totals:
         integrals: Integrals of the running costs by name.
         distance: Distance of the stride [m].
         time: Time of the stride [s].
-        durations: Durations of the eight phases, or of four of half a cycle [s].
+        durations: Durations of the phases, of half a cycle those of one step [s].
+        phases: The phases.
     """
 
     integrals: Mapping[str, Any]
     distance: Any
     time: Any
     durations: Sequence[Any]
+    phases: Sequence[ContactPhase]
 
 
 @dataclass(frozen=True)
@@ -200,12 +203,23 @@ def _asymmetry(point: Instant) -> tuple[Any, ...]:
 
 def _asymmetry_value(total: Totals) -> Any:
     advance, *differences = (total.integrals[name] for name in GOALS["asymmetry"].integrals)
-    half = len(PHASES) // 2
-    pairs = [(total.durations[i], total.durations[i + half]) for i in range(half)]
     squares = [(2.0 * advance - total.distance) / total.distance]
-    squares += [(first - second) / total.time for first, second in pairs]
+    squares += [(first - second) / total.time for first, second in _pairs(total)]
     squares += [difference / total.time for difference in differences]
     return sum(square**2 for square in squares)
+
+
+def _pairs(total: Totals) -> list[tuple[Any, Any]]:
+    """Return the times of phases right and left; of unlike steps those of their supports."""
+    timed = list(zip(total.phases, total.durations, strict=True))
+    right, left = ([each for each in timed if each[0].step == side] for side in SIDES)
+    if len(right) == len(left):
+        return [(a, b) for (_, a), (_, b) in zip(right, left, strict=True)]
+
+    def supported(step: list[tuple[ContactPhase, Any]], feet: int) -> Any:
+        return sum(time for phase, time in step if len(phase.feet) == feet)
+
+    return [(supported(right, feet), supported(left, feet)) for feet in (1, 2)]
 
 
 def _pressure(point: Instant) -> tuple[Any, ...]:

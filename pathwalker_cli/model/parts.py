@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Final
 
 from pathwalker_cli.conventions import Condition
-from pathwalker_cli.model.contact import POINTS, Feet
+from pathwalker_cli.model.contact import POINTS, Contact, ContactPattern, Feet, contact_pattern
 from pathwalker_cli.model.devices import DEVICES, Device
 from pathwalker_cli.model.elements import ForceElement
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
@@ -27,11 +27,18 @@ class Parts:
         condition: "barefoot" or "orthosis".
         tissue: Whether joints have passive torques.
         feet: What the feet touch the ground with.
+        contact: How right and left foot are used; a sole needs to know nothing of it.
     """
 
     condition: Condition = "barefoot"
     tissue: bool = False
     feet: Feet = "points"
+    contact: Contact = ("heel_toe", "heel_toe")
+
+    @property
+    def pattern(self) -> ContactPattern:
+        """The order in which places of the feet stand on the ground."""
+        return contact_pattern(self.feet, self.contact)
 
     @property
     def device(self) -> Device:
@@ -54,14 +61,17 @@ class Parts:
         return (*self.muscles, *self.passive, *self.device.forces)
 
     @cached_property
-    def radii(self) -> tuple[Number, ...]:
-        """Radius of every contact point's circle, in the order of `POINTS`; none for points."""
-        return tuple(point.radius for point in POINTS) if self.feet == "rockers" else ()
+    def shapes(self) -> tuple[Number, ...]:
+        """Radii of the circles in the order of `POINTS`, roundness of the soles; none of points."""
+        if self.feet == "points":
+            return ()
+        round_soles = self.pattern.points if self.feet == "sole" else ()
+        return tuple(point.shape for point in (*POINTS, *round_soles))
 
     @cached_property
     def body_numbers(self) -> tuple[Number, ...]:
         """The numbers that enter the rigid bodies and their contacts, all of them linearly."""
-        return (*self.device.added_mass.values(), *self.radii)
+        return (*self.device.added_mass.values(), *self.shapes)
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:

@@ -11,11 +11,18 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import CONDITIONS, CONTACT_FORCES, CONTACT_POINTS, SIDES, Condition
+from pathwalker_cli.conventions import CONDITIONS, SIDES, Condition
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.backends import rigid_body_functions
 from pathwalker_cli.model.backends.functions import RigidBodyFunctions
-from pathwalker_cli.model.contact import ContactPhase, Feet, phase_named
+from pathwalker_cli.model.contact import (
+    POINTS,
+    Contact,
+    ContactPattern,
+    ContactPhase,
+    Feet,
+    phase_named,
+)
 from pathwalker_cli.model.devices import Device
 from pathwalker_cli.model.elements import ForceElement, State, element_forces, generalised_forces
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator
@@ -93,10 +100,14 @@ class Walker:
         return self.parts.numbers
 
     @property
-    def radii(self) -> np.ndarray:
-        """Radius of the circle on which each contact point rolls [m], shape (4,); 0: a point."""
-        numbers = self.parts.radii
-        return np.array([self.values[n.address] for n in numbers] or [0.0] * len(CONTACT_POINTS))
+    def pattern(self) -> ContactPattern:
+        """The order in which places of the feet stand on the ground."""
+        return self.parts.pattern
+
+    @property
+    def shapes(self) -> list[float]:
+        """Values of `Parts.shapes`: radii [m], then roundnesses [-]."""
+        return [self.values[number.address] for number in self.parts.shapes]
 
     @property
     def max_isometric_torque(self) -> np.ndarray:
@@ -129,7 +140,7 @@ class Walker:
         if all(values[address] == self.values[address] for address in bodies):
             return changed
         model = pinocchio_model(self.patient, self.condition, self.published, values)
-        parameters = self.rigid_body.parameters_for(model, changed.radii)
+        parameters = self.rigid_body.parameters_for(model, changed.shapes)
         return replace(
             changed, model=model, rigid_body=replace(self.rigid_body, parameters=parameters)
         )
@@ -150,7 +161,7 @@ class Walker:
         data, zero = self.model.createData(), np.zeros(self.model.nq)
         pin.forwardKinematics(self.model, data, zero)
         hip = np.mean([data.oMi[self.model.getJointId(f"hip_{s}")].translation[2] for s in "rl"])
-        return float(hip - self.contact_points(zero)[:, 1].mean())
+        return float(hip - self.foot_points(zero)[:, 1].mean())
 
     def moves_bodies(self, unknown: Unknown) -> bool:
         """Return whether an unknown is a number of the rigid bodies."""
@@ -263,7 +274,7 @@ class Walker:
 
         Returns:
             vdot [m/s^2, rad/s^2], shape (10,), and forces on the body [N] in the order of
-            `conventions.CONTACT_FORCES`, shape (8,); zero where there is no contact.
+            `pattern.forces`, shape (8,); zero where there is no contact.
         """
         n, root = self.skeleton.size, len(self.skeleton.root)
         q, v, tau = _vector(q, n, "q"), _vector(v, n, "v"), np.asarray(tau, float).ravel()
@@ -286,7 +297,8 @@ class Walker:
         q, v and tau are of shape (m, 10); `terms` evaluates `dynamics_terms` at m points, if not
         the function itself.
         """
-        active = list((phase if isinstance(phase, ContactPhase) else phase_named(phase)).indices)
+        contact = phase if isinstance(phase, ContactPhase) else phase_named(phase)
+        active = self.pattern.indices(contact)
         count, n, size = len(q), self.skeleton.size, len(active)
         mass, bias, jacobian, drift = map(np.asarray, (terms or self.dynamics_terms)(q.T, v.T))
         # of m instants CasADi sets the matrices side by side
@@ -297,23 +309,33 @@ class Walker:
         matrix[:, :n, n:] = -jacobian.swapaxes(1, 2)
         right = np.hstack([tau - bias.T, -drift[active].T])[..., None]
         solution = np.linalg.solve(matrix, right)[..., 0]
-        forces = np.zeros((count, len(CONTACT_FORCES)))
+        forces = np.zeros((count, len(self.pattern.forces)))
         forces[:, active] = solution[:, n:]
         return solution[:, :n], forces
 
     def contact_points(self, q: Any) -> np.ndarray:
-        """Return where right heel, right toe, left heel, left toe touch the ground, or would.
+        """Return where the places of `pattern.points` touch the ground, or would.
 
         Args:
             q: Generalised coordinates [m, rad], shape (10,).
 
         Returns:
-            The lowest points of their circles, x and z [m], shape (4, 2).
+            Forward and up [m], shape (k, 2): right heel, right toe, left heel, left toe; of soles
+            right and left.
         """
         q, body = _vector(q, self.skeleton.size, "q"), self.rigid_body
-        places = np.array(body.point_positions(q, body.parameters)).reshape(-1, 2)
-        places[:, 0] += self.radii * (body.topology.turns @ q)  # the arc that it has rolled
-        return places
+        return np.asarray(body.point_positions(q, body.parameters)).reshape(-1, 2)
+
+    def foot_points(self, q: Any) -> np.ndarray:
+        """Return right heel, right toe, left heel, left toe: forward and up [m], shape (4, 2).
+
+        Args:
+            q: Generalised coordinates [m, rad], shape (10,).
+        """
+        data = self.model.createData()
+        pin.framesForwardKinematics(self.model, data, _vector(q, self.skeleton.size, "q"))
+        frames = [self.model.getFrameId(point.name) for point in POINTS]
+        return np.array([data.oMf[frame].translation[[0, 2]] for frame in frames])
 
     @cached_property
     def dynamics_terms(self) -> ca.Function:
@@ -342,6 +364,7 @@ def build_walker(
     free: Sequence[str] = (),
     tissue: bool = False,
     feet: Feet = "points",
+    contact: Contact = ("heel_toe", "heel_toe"),
 ) -> Walker:
     """Return the walking model of a patient; see `Parts` and `walker_of`.
 
@@ -354,7 +377,8 @@ def build_walker(
         raise InputError(
             f"there is no condition {condition!r}", allowed=" or ".join(map(repr, CONDITIONS))
         )
-    return walker_of(patient, Parts(condition, tissue, feet), published, backend, free)
+    parts = Parts(condition, tissue, feet, contact)
+    return walker_of(patient, parts, published, backend, free)
 
 
 def walker_of(
@@ -381,13 +405,14 @@ def walker_of(
         patient.require_orthosis()
     model = pinocchio_model(patient, parts.condition, published)
     values = {n.address: n.value_for(patient) for n in parts.numbers}
-    radii = [values[number.address] for number in parts.radii]
+    frames, shapes = [point.name for point in POINTS], [values[n.address] for n in parts.shapes]
+    soles = parts.feet == "sole"
     return Walker(
         patient=patient,
         parts=parts,
         skeleton=PLANAR_WALKER,
         model=model,
-        rigid_body=rigid_body_functions(model, CONTACT_POINTS, backend, radii),
+        rigid_body=rigid_body_functions(model, frames, backend, shapes, soles),
         values=values,
         unknowns=parts.unknowns(free),
         published=published,

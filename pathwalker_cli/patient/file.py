@@ -26,6 +26,7 @@ from pathwalker_cli.patient.blocks import (
     OrthosisData,
     Recorded,
     RockerRadius,
+    Roundness,
     SegmentLengths,
     Strengths,
 )
@@ -75,6 +76,7 @@ class Patient(YamlModel):
     segment_lengths: SegmentLengths = SegmentLengths()
     contact_points: ContactPoints = ContactPoints()
     rocker_radius: RockerRadius = RockerRadius()
+    sole_roundness: Sides[Roundness] | None = None
     strengths: Strengths | None = None
     examination: Examination = Examination()
     orthosis: OrthosisData | None = None

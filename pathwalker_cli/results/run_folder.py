@@ -293,7 +293,9 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
     case = _kept_case(folder)
     config = case.config
     expected = len(case.parts.unknowns(tuple(config.free)))
-    if config.problem != metrics["problem"] or motion.parameters.size != expected:
+    phases = tuple(phase.name for phase in motion.phases)
+    fits = motion.parameters.size == expected and phases == config.model.pattern.names
+    if config.problem != metrics["problem"] or not fits:
         where = str(folder / CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)
     return Run(folder, metrics, motion, case, multipliers)
