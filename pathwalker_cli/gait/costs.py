@@ -37,6 +37,8 @@ class Instant:
         vdot: Generalised accelerations, 10 entries [m/s^2, rad/s^2].
         reserve: Reserve forces, 10 entries [N, N m].
         reference: Coordinates that are followed, 10 entries [m, rad].
+        heights: Heights of the places in the air, in the order of the walker's pattern [m].
+        speeds: Their forward velocities [m/s].
         power: Power of the activations in the effort.
         data: Numbers of the term, see `CostTerm.size`.
     """
@@ -51,6 +53,8 @@ class Instant:
     vdot: Sequence[Any] = ()
     reserve: Sequence[Any] = ()
     reference: Sequence[Any] = ()
+    heights: Sequence[Any] = ()
+    speeds: Sequence[Any] = ()
     power: int = field(default=2, kw_only=True)
     data: Sequence[Any] = ()
 
@@ -264,6 +268,12 @@ def _foot_pitch(point: Instant) -> tuple[Any, ...]:
     return (sum((sum(map(point.angle, names)) ** 2 for names in chain), 0.0 * point.q[0]),)
 
 
+def _stumbling(point: Instant) -> tuple[Any, ...]:
+    pairs = zip(point.heights, point.speeds, strict=True)
+    near = (speed**2 * np.exp(-height / choices.NEAR_GROUND) for height, speed in pairs)
+    return (sum(near, 0.0 * point.q[0]),)
+
+
 def _mean(name: str) -> Callable[[Totals], Any]:
     """Return the mean over the stride of one running cost as a value."""
     return lambda total: total.integrals[name] / total.time
@@ -288,6 +298,11 @@ GOALS: Final[dict[str, CostTerm]] = {
     "level_foot": CostTerm(
         "carry the foot level: squared pitch of feet in the air, per distance",
         ("foot_pitch",), _foot_pitch, _of("foot_pitch"), "rad^2 s/m", per_distance=True,
+    ),
+    "clear_ground": CostTerm(
+        "swing the feet clear of the ground: squared forward speed of places in the air, less by "
+        "the factor e per centimetre of height, per distance",
+        ("stumbling",), _stumbling, _of("stumbling"), "m/s", per_distance=True,
     ),
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",

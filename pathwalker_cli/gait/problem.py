@@ -234,7 +234,7 @@ class GaitProblem:
             path=self._path(contact, force, position),
             end=self._touch_down(contact.touched_down(following), position, velocity, acceleration),
             fixed_at_end=self._fixed_at_end(contact, following),
-            integrands=self._integrands(contact, vdot, force, reserve),
+            integrands=self._integrands(contact, vdot, force, reserve, position, velocity),
             frozen=frozen,
         )
 
@@ -248,11 +248,20 @@ class GaitProblem:
         )
 
     def _integrands(
-        self, contact: ContactPhase, vdot: ca.SX, force: ca.SX, reserve: ca.SX
+        self,
+        contact: ContactPhase,
+        vdot: ca.SX,
+        force: ca.SX,
+        reserve: ca.SX,
+        position: ca.SX,
+        velocity: ca.SX,
     ) -> ca.SX:
         a, rate = self.activations.symbol, self.rates.symbol
         columns = (self.q, self.v, a, force, rate, excitation_from_rate(rate, a), vdot, reserve)
-        point = Instant(contact, *(ca.vertsplit(x) for x in (*columns, self.reference)))
+        air = self.pattern.in_the_air(contact)
+        heights, speeds = position[[2 * i + 1 for i in air]], velocity[[2 * i for i in air]]
+        columns = (*columns, self.reference, heights, speeds)
+        point = Instant(contact, *(ca.vertsplit(x) if x.numel() else [] for x in columns))
         numbers = ca.vertsplit(self.constants.cost_numbers)
         return ca.vertcat(*self.costs.integrands(point, numbers))
 
@@ -268,7 +277,8 @@ class GaitProblem:
 
     def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
         """Return heights of the points in the air and the friction cones of the loaded feet."""
-        airborne = [f for f in self.pattern.forces if f.bears and f.point not in contact.points]
+        places = [self.pattern.points[i] for i in self.pattern.in_the_air(contact)]
+        airborne = [ContactForce(place, "z") for place in places]
         height = "{0.point.name} height"
         rows = [self._rows(position, airborne, height, choices.HEIGHT_SIZE, INFINITY)]
         for side in sorted(contact.feet):

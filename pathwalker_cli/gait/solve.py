@@ -224,7 +224,7 @@ class GaitSolver:
         mesh = self.config.mesh
         motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])
         if not self.config.fits:
-            motion = with_goal_costs(motion, self.gait.costs, self.walker.weight)
+            motion = with_goal_costs(motion, self.gait.costs, self.walker)
         if mesh.refinements > 0:
             return motion
         return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)

@@ -187,6 +187,10 @@ class ContactPattern:
         """Return the positions of the places of a side in `points`."""
         return [i for i, point in enumerate(self.points) if point.side == side]
 
+    def in_the_air(self, phase: ContactPhase) -> list[int]:
+        """Return the positions in `points` of the places that are not on the ground."""
+        return [i for i, point in enumerate(self.points) if point not in phase.points]
+
     def strike(self, side: Side) -> int:
         """Return the number of the phase that begins with the foot strike of a side."""
         pairs = zip(self.following, self.phases, strict=True)

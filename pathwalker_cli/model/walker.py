@@ -338,6 +338,14 @@ class Walker:
         return np.array([data.oMf[frame].translation[[0, 2]] for frame in frames])
 
     @cached_property
+    def contact_motion(self) -> ca.Function:
+        """Function (q, v) -> positions (2 k,) [m] and velocities [m/s] of the pattern's places."""
+        body, theta = self.rigid_body, self.rigid_body.parameters
+        q, v = ca.SX.sym("q", body.nq), ca.SX.sym("v", body.nq)
+        values = body.point_positions(q, theta), body.point_velocities(q, v, theta)
+        return ca.Function("contact_motion", [q, v], [ca.densify(x) for x in values])
+
+    @cached_property
     def dynamics_terms(self) -> ca.Function:
         """Function (q, v) -> mass matrix, bias, point Jacobian, point acceleration at vdot = 0."""
         body, theta = self.rigid_body, self.rigid_body.parameters
