@@ -270,8 +270,20 @@ def _foot_pitch(point: Instant) -> tuple[Any, ...]:
 
 def _stumbling(point: Instant) -> tuple[Any, ...]:
     pairs = zip(point.heights, point.speeds, strict=True)
-    near = (speed**2 * np.exp(-height / choices.NEAR_GROUND) for height, speed in pairs)
+    near = (speed**2 / (1.0 + (h / choices.NEAR_GROUND) ** 2) ** 2 for h, speed in pairs)
     return (sum(near, 0.0 * point.q[0]),)
+
+
+def _load(axis: str) -> Callable[[Instant], tuple[Any, ...]]:
+    """Return the squares of the forces on the feet in a direction as a running cost [-]."""
+
+    def squares(point: Instant) -> tuple[Any, ...]:
+        forces = list(zip(point.phase.forces, point.force, strict=True))
+        feet = (sum(x for f, x in forces if (f.point.side, f.axis) == (side, axis))
+                for side in point.phase.feet)  # fmt: skip
+        return (sum((force / point.data[0]) ** 2 for force in feet),)
+
+    return squares
 
 
 def _mean(name: str) -> Callable[[Totals], Any]:
@@ -300,9 +312,18 @@ GOALS: Final[dict[str, CostTerm]] = {
         ("foot_pitch",), _foot_pitch, _of("foot_pitch"), "rad^2 s/m", per_distance=True,
     ),
     "clear_ground": CostTerm(
-        "swing the feet clear of the ground: squared forward speed of places in the air, less by "
-        "the factor e per centimetre of height, per distance",
+        "swing the feet clear of the ground: squared forward speed of places in the air, a quarter "
+        "of it at 1.5 cm of height and hardly any above 4, per distance",
         ("stumbling",), _stumbling, _of("stumbling"), "m/s", per_distance=True,
+    ),
+    "foot_load": CostTerm(
+        "share the load between the feet: squared vertical forces on them in body weights, per "
+        "distance",
+        ("foot_load",), _load("z"), _of("foot_load"), "s/m", size=1, per_distance=True,
+    ),
+    "foot_shear": CostTerm(
+        "neither brake nor push: squared fore-aft forces on the feet in body weights, per distance",
+        ("foot_shear",), _load("x"), _of("foot_shear"), "s/m", size=1, per_distance=True,
     ),
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",
@@ -385,7 +406,7 @@ class Costs:
         ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
         known = {
             "upright_trunk": [self.trunk_lean],
-            "centre_of_pressure": [weight],
+            **dict.fromkeys(("foot_load", "foot_shear", "centre_of_pressure"), [weight]),
             "discomfort": np.array(ranges).T.ravel(),
         }
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])

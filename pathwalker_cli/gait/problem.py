@@ -260,8 +260,8 @@ class GaitProblem:
         columns = (self.q, self.v, a, force, rate, excitation_from_rate(rate, a), vdot, reserve)
         air = self.pattern.in_the_air(contact)
         heights, speeds = position[[2 * i + 1 for i in air]], velocity[[2 * i for i in air]]
-        columns = (*columns, self.reference, heights, speeds)
-        point = Instant(contact, *(ca.vertsplit(x) if x.numel() else [] for x in columns))
+        known = *columns, self.reference, heights, speeds
+        point = Instant(contact, *(ca.vertsplit(x) if x.numel() else [] for x in known))
         numbers = ca.vertsplit(self.constants.cost_numbers)
         return ca.vertcat(*self.costs.integrands(point, numbers))
 
