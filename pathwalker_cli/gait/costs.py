@@ -406,7 +406,9 @@ class Costs:
         ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
         known = {
             "upright_trunk": [self.trunk_lean],
-            **dict.fromkeys(("foot_load", "foot_shear", "centre_of_pressure"), [weight]),
+            "foot_load": [weight],
+            "foot_shear": [weight],
+            "centre_of_pressure": [weight],
             "discomfort": np.array(ranges).T.ravel(),
         }
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])
