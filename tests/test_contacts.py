@@ -246,7 +246,7 @@ def test_a_symmetric_walk_on_soles_is_one_step_twice() -> None:
     config = with_values(
         load_config("mapd-healthy"),
         {"model.feet": "sole", "mesh.intervals": (4, 3, 4, 3), "mesh.refinements": 0,
-         "solver.tolerance": 1e-3, "verdict": False},
+         "solver.tolerance": 1e-3, "verdict": False, "bounds.phase_durations": {}},
     )  # fmt: skip
     solution = solve_study(config)
     assert solution.converged

@@ -274,18 +274,6 @@ def _stumbling(point: Instant) -> tuple[Any, ...]:
     return (sum(near, 0.0 * point.q[0]),)
 
 
-def _load(axis: str) -> Callable[[Instant], tuple[Any, ...]]:
-    """Return the squares of the forces on the feet in a direction as a running cost [-]."""
-
-    def squares(point: Instant) -> tuple[Any, ...]:
-        forces = list(zip(point.phase.forces, point.force, strict=True))
-        feet = (sum(x for f, x in forces if (f.point.side, f.axis) == (side, axis))
-                for side in point.phase.feet)  # fmt: skip
-        return (sum((force / point.data[0]) ** 2 for force in feet),)
-
-    return squares
-
-
 def _mean(name: str) -> Callable[[Totals], Any]:
     """Return the mean over the stride of one running cost as a value."""
     return lambda total: total.integrals[name] / total.time
@@ -315,15 +303,6 @@ GOALS: Final[dict[str, CostTerm]] = {
         "swing the feet clear of the ground: squared forward speed of places in the air, a quarter "
         "of it at 1.5 cm of height and hardly any above 4, per distance",
         ("stumbling",), _stumbling, _of("stumbling"), "m/s", per_distance=True,
-    ),
-    "foot_load": CostTerm(
-        "share the load between the feet: squared vertical forces on them in body weights, per "
-        "distance",
-        ("foot_load",), _load("z"), _of("foot_load"), "s/m", size=1, per_distance=True,
-    ),
-    "foot_shear": CostTerm(
-        "neither brake nor push: squared fore-aft forces on the feet in body weights, per distance",
-        ("foot_shear",), _load("x"), _of("foot_shear"), "s/m", size=1, per_distance=True,
     ),
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",
@@ -406,8 +385,6 @@ class Costs:
         ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
         known = {
             "upright_trunk": [self.trunk_lean],
-            "foot_load": [weight],
-            "foot_shear": [weight],
             "centre_of_pressure": [weight],
             "discomfort": np.array(ranges).T.ravel(),
         }
