@@ -41,6 +41,9 @@ _ABOUT: Final = {
     "contact_points": "Heel and toe of the rigid foot, `[forward, up]` of the ankle joint [m], with the foot at "
     "90 degrees to the shank. One pair counts for both feet; `{right: {heel: ..., toe: ...}, left: ...}` tells them "
     "apart.",
+    "rocker_radius": "Radii of the circles on which heel and ball of the foot roll, barefoot and shod, and of the ends of "
+    "a sole. They count in problems with `model.feet` rockers or sole; what is left out is a share of the length of the "
+    "foot.",
     "strengths": "Maximum isometric torques. Needed for predictions, not for recorded gait; `pathwalker id` "
     "estimates them from recordings. Given, the block must be complete.",
     "examination": "Passive range of motion from the couch, in degrees. Counts in problems with `model.tissue: true`; "
@@ -84,6 +87,10 @@ MEANINGS: Final = {
     "contact_points.barefoot.toe": "",
     "contact_points.orthosis.heel": "sole of the shoe that is worn with the orthosis; needed with one",
     "contact_points.orthosis.toe": "",
+    "rocker_radius.heel": "left out: 0.18 of the foot's length",
+    "rocker_radius.toe": "left out: 0.18 of the foot's length",
+    "sole_roundness": "radius of a sole where it lies flat, in distances from heel to toe, for `model.feet: sole`; "
+    "left out: 1.5",
     "strengths.hip_extension": "",
     "strengths.hip_flexion": "",
     "strengths.knee_extension": "",
