@@ -104,6 +104,8 @@ MEANINGS: Final = {
     "examination.knee_extension": "negative where the knee does not straighten; typical 0",
     "examination.dorsiflexion_knee_extended": "with the knee straight; typical 13",
     "examination.dorsiflexion_knee_flexed": "with the knee at 90; typical 32",
+    "orthosis.cuff_height": "middle of the cuff above the hinge, for its force on the leg; left out: 0.7 of the shank",
+    "orthosis.cuff_area": "area on which the cuff presses, in front or behind; left out: 0.06 of the squared shank",
     "orthosis.mass.shank": "what orthosis and shoe add to each shank",
     "orthosis.mass.foot": "the same of each foot",
     "orthosis.neutral_angle": "ankle angle at which the springs give no torque",

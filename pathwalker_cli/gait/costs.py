@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, LEG_
 from pathwalker_cli.gait import choices
 from pathwalker_cli.model.contact import ContactPhase
 from pathwalker_cli.model.skeleton import SIDES
+
+if TYPE_CHECKING:
+    from pathwalker_cli.model.walker import Walker
 
 Weights = Mapping[str, float]
 """Weight of every term by its name; what is missing counts nothing."""
@@ -39,6 +42,7 @@ class Instant:
         reference: Coordinates that are followed, 10 entries [m, rad].
         heights: Heights of the places in the air, in the order of the walker's pattern [m].
         speeds: Their forward velocities [m/s].
+        worn: Torques of the orthoses right, left [N m]; none barefoot.
         power: Power of the activations in the effort.
         data: Numbers of the term, see `CostTerm.size`.
     """
@@ -55,6 +59,7 @@ class Instant:
     reference: Sequence[Any] = ()
     heights: Sequence[Any] = ()
     speeds: Sequence[Any] = ()
+    worn: Sequence[Any] = ()
     power: int = field(default=2, kw_only=True)
     data: Sequence[Any] = ()
 
@@ -274,6 +279,12 @@ def _stumbling(point: Instant) -> tuple[Any, ...]:
     return (sum(near, 0.0 * point.q[0]),)
 
 
+def _cuff_load(point: Instant) -> tuple[Any, ...]:
+    weight, *heights = point.data
+    forces = (torque / (h * weight) for torque, h in zip(point.worn, heights, strict=False))
+    return (sum((force**2 for force in forces), 0.0 * point.q[0]),)
+
+
 def _mean(name: str) -> Callable[[Totals], Any]:
     """Return the mean over the stride of one running cost as a value."""
     return lambda total: total.integrals[name] / total.time
@@ -303,6 +314,11 @@ GOALS: Final[dict[str, CostTerm]] = {
         "swing the feet clear of the ground: squared forward speed of places in the air, a quarter "
         "of it at 1.5 cm of height and hardly any above 4, per distance",
         ("stumbling",), _stumbling, _of("stumbling"), "m/s", per_distance=True,
+    ),
+    "cuff_load": CostTerm(
+        "spare the leg under the cuff: squared forces of the orthoses' cuffs in body weights, per "
+        "distance",
+        ("cuff_load",), _cuff_load, _of("cuff_load"), "s/m", size=3, per_distance=True,
     ),
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",
@@ -379,13 +395,14 @@ class Costs:
         """How many numbers the terms take."""
         return sum(term.size for term in self.terms.values())
 
-    def numbers(self, weight: float) -> np.ndarray:
-        """Return the numbers of all terms for a body weight, orthosis included [N], (size,)."""
+    def numbers(self, walker: Walker) -> np.ndarray:
+        """Return the numbers of all terms for a walker, shape (size,)."""
         wide = (-choices.NO_EDGE, choices.NO_EDGE)
         ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
         known = {
             "upright_trunk": [self.trunk_lean],
-            "centre_of_pressure": [weight],
+            "centre_of_pressure": [walker.weight],
+            "cuff_load": [walker.weight, *(walker.patient.cuff_height(side) for side in SIDES)],
             "discomfort": np.array(ranges).T.ravel(),
         }
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])
