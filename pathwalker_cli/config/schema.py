@@ -12,8 +12,15 @@ from pathwalker_cli.conventions import ANGLES, STIFFNESSES, Condition
 from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.gait.costs import ELSEWHERE, GOALS, Costs
 from pathwalker_cli.installed import load_installed
-from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
-from pathwalker_cli.model.contact import PHASE_NAMES
+from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
+from pathwalker_cli.model.contact import (
+    PHASE_NAMES,
+    Contact,
+    ContactPattern,
+    Feet,
+    Use,
+    contact_pattern,
+)
 from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.patient.variation import Variation
 from pathwalker_cli.problems import PROBLEMS
@@ -76,6 +83,9 @@ def _as_text(value: Any) -> Any:
 TrialName = Annotated[str, BeforeValidator(_as_text)]
 
 
+Uses = Sides[Use]  # named at the top of a module, its values can be pickled
+
+
 class ModelConfig(YamlModel):
     """Which model is built."""
 
@@ -83,6 +93,27 @@ class ModelConfig(YamlModel):
     published: bool = False
     tissue: bool = False
     elements: Annotated[tuple[str, ...], AS_TUPLE] = ()
+    feet: Feet = "points"
+    contact: Uses = Uses(right="heel_toe", left="heel_toe")
+
+    @property
+    def uses(self) -> Contact:
+        """Use of the right and the left foot."""
+        return self.contact.right, self.contact.left
+
+    @property
+    def pattern(self) -> ContactPattern:
+        """The phases of a stride."""
+        return contact_pattern(self.feet, self.uses)
+
+    @model_validator(mode="after")
+    def _rolling(self) -> ModelConfig:
+        if self.feet == "sole" and set(self.uses) != {"heel_toe"}:
+            raise invalid(
+                "gives model.contact for feet with soles, which roll over whatever they land on",
+                mend="leave contact out, or set feet to rockers",
+            )
+        return self
 
 
 class CostConfig(YamlModel):
@@ -184,16 +215,6 @@ class MeshConfig(YamlModel):
     velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2
     refinements: Annotated[int, Field(ge=0, le=20)] = 12
 
-    @field_validator("intervals")
-    @classmethod
-    def _one_per_phase(cls, value: int | tuple[int, ...]) -> int | tuple[int, ...]:
-        if isinstance(value, tuple) and len(value) != len(PHASE_NAMES):
-            raise invalid(
-                f"has {len(value)} entries",
-                allowed=f"one number, or one per phase: {len(PHASE_NAMES)}",
-            )
-        return value
-
 
 class StartConfig(YamlModel):
     """Where the search begins."""
@@ -259,6 +280,26 @@ class StudyConfig(YamlModel):
             allowed = ", ".join(PROBLEMS)
             raise invalid(f"is '{value}'", allowed=allowed, mend=did_you_mean(value, PROBLEMS))
         return value
+
+    @model_validator(mode="after")
+    def _one_per_phase(self) -> StudyConfig:
+        given, names = self.mesh.intervals, self.model.pattern.names
+        if isinstance(given, tuple) and len(given) != len(names):
+            raise invalid(
+                f"has {len(given)} entries in mesh.intervals",
+                allowed=f"one number, or one per phase: {len(names)} ({', '.join(names)})",
+            )
+        if strangers := sorted(self.bounds.phase_durations.keys() - set(names)):
+            raise invalid(
+                f"bounds the phase {strangers[0]}, which these feet do not have",
+                allowed=", ".join(names),
+            )
+        if self.model.feet == "sole" and self.cost.goals.get("centre_of_pressure"):
+            raise invalid(
+                "weighs the goal 'centre_of_pressure', which needs heel and toe: a sole rolls",
+                mend="leave the goal out, or set model.feet to points or rockers",
+            )
+        return self
 
     @model_validator(mode="after")
     def _start(self) -> StudyConfig:

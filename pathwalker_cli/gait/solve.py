@@ -14,6 +14,7 @@ from pathwalker_cli.config import MeshConfig, StudyConfig
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
+    fallback_speed,
     gait_bounds,
     helped_bounds,
     recorded_durations,
@@ -80,7 +81,7 @@ class GaitSolver:
         if self.config.start.gait == "recorded":
             _ = self.stride  # a missing recording is refused before anything is built
         if self.config.fits:
-            self.bounds = recorded_durations(self.bounds, self.stride.durations)
+            self.bounds = recorded_durations(self.bounds, self._durations)
         self.blocks = gait_blocks(self.gait, self.config.mesh.degree)
         self.seconds["build"] += time.perf_counter() - began
 
@@ -119,10 +120,17 @@ class GaitSolver:
         return stylised_stride(self.walker, self.start_speed, crouch, ratio)
 
     @property
+    def _durations(self) -> dict[str, float]:
+        """Durations of the phases of that stride by name [s]."""
+        durations = self.stride.durations.tolist()
+        return dict(zip(self.walker.pattern.names, durations, strict=True))
+
+    @property
     def start_speed(self) -> float:
-        """Speed of a synthetic start [m/s]: the config's, or the least speed allowed."""
+        """Speed of a synthetic start [m/s]: the config's, or a slow walk of these legs."""
         least = self.bounds.table.entries[("walking_speed",)][0]
-        return self.config.start.walking_speed or least
+        slow = fallback_speed(self.walker.patient, self.config.bounds)
+        return self.config.start.walking_speed or max(least, slow)
 
     @cached_property
     def samples(self) -> tuple[Sample, ...]:
@@ -218,7 +226,7 @@ class GaitSolver:
         mesh = self.config.mesh
         motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])
         if not self.config.fits:
-            motion = with_goal_costs(motion, self.gait.costs, self.walker.weight)
+            motion = with_goal_costs(motion, self.gait.costs, self.walker)
         if mesh.refinements > 0:
             return motion
         return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
@@ -273,7 +281,7 @@ class GaitSolver:
         """
         mesh, stride, unknowns = self.config.mesh, self.stride, self.walker.unknowns
         held = self.parameter_guess() * [choices.FADED if u.faded else 1.0 for u in unknowns]
-        table = tracking_bounds(self.bounds, stride.durations, self.by_name(held))
+        table = tracking_bounds(self.bounds, self._durations, self.by_name(held))
         meshes = meshing.first(stride.durations[: len(self.gait.phases)], mesh)
         costs = len(self.gait.costs.integrals)
         motion = stride.motion(self.walker, held, meshes, mesh.degree, costs)
