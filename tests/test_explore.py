@@ -15,7 +15,7 @@ import pytest
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
-from conftest import sketch
+from conftest import MadeSolution, sketch
 from helpers import GUARD, called_apart
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import load_config, smoke_version, with_values
@@ -31,6 +31,7 @@ from pathwalker_cli.results.run_folder import Run, load_run
 from pathwalker_cli.studies.base import Work
 from pathwalker_cli.studies.landscape import STUDY, LandscapeStudy
 from pathwalker_cli.studies.run import run_study
+from report_runs import write_made_run
 
 K_D = "orthosis.stiffness_guess.dorsiflexion.right"
 NEUTRAL = "orthosis.neutral_angle"
@@ -327,6 +328,17 @@ def test_a_run_without_device_or_tissue_has_dials_too(run: Run) -> None:
     assert {dial.group for dial in bare.dials} == {"Wish", "Strength"}
     key = "strengths.hip_flexion.left"
     assert bare.solve(turned(bare, key)).converged
+
+
+def test_runs_without_neighbours_are_refused(made_solution: MadeSolution, tmp_path: Path) -> None:
+    write_made_run(tmp_path / "half", made_solution, "mapd-healthy")
+    write_made_run(tmp_path / "failed", made_solution, "mapd-barefoot", status="iteration limit")
+    for name, sentence in (("half", "half a cycle"), ("failed", "did not converge"),
+                           ("none", "no such folder")):  # fmt: skip
+        done = called_apart(tmp_path, "explore", name)
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert sentence in done.stderr
 
 
 @pytest.mark.parametrize(
