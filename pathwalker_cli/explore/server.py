@@ -26,9 +26,10 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.explore.worker import serve_moves
-from pathwalker_cli.io.processes import LOST, begun_process
+from pathwalker_cli.io.processes import begun_process
 
 _HOST: Final = "127.0.0.1"
+_LOST: Final = "the solver was ended from outside (out of memory?); call again"
 _NAME: Final = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,79}")
 """Names of folders that settings may be saved in."""
 _LARGEST: Final = 100_000
@@ -161,7 +162,7 @@ class Desk:
         try:
             message = self._connection.recv()
         except (EOFError, OSError):
-            message = {"kind": "ended", "sentence": LOST}
+            message = {"kind": "ended", "sentence": _LOST}
         if message["kind"] == "ready":
             self.page, self._keys = message["page"], frozenset(message["keys"])
             self.ready.set_result(None)
