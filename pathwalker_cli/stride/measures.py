@@ -306,6 +306,7 @@ TABLES: Final[Mapping[str, Sequence[str]]] = {
         "swing_share_*", "double_support_share", _CROUCH, "peak_vertical_force_*_body_weights",
         "ankle_torque_slope_*", "max_friction_ratio_*", "positive_muscle_work",
         "negative_muscle_work", "positive_orthosis_work", "negative_orthosis_work",
+        "peak_shin_force_*", "peak_calf_force_*", "peak_cuff_pressure_*",
         "effort_per_distance", *_SPRINGS, "cost",
     ),
     "batch": ("cost", "walking_speed", "step_length_*", _CROUCH, *_SPRINGS,
