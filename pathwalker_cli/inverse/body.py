@@ -17,10 +17,10 @@ import numpy as np
 
 from pathwalker_cli.conventions import GRAVITY, SIDES, Side
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.joint_centres import LEFTWARD, hip_centre
 from pathwalker_cli.inverse.marker_sets import (
     KnownSet,
     foot_places,
-    hip_centre,
     recognised,
     set_points,
 )
@@ -179,12 +179,12 @@ def _lengths(recording: Recording, known: KnownSet) -> dict[str, tuple[float, fl
     left = _unit(left)
     up = np.cross(ahead, left)
     every: dict[str, list[float]] = {"thigh": [], "shank": [], "foot": []}
-    for side, spine, sign in zip(SIDES, spines, (-1.0, 1.0), strict=True):
+    for side, spine in zip(SIDES, spines, strict=True):
         knee = recording.marker(known.markers["knee", side])
         ankle = recording.marker(known.markers["ankle", side])
         leg = _apart(spine, knee) + _apart(knee, ankle)
         behind, aside, below = hip_centre(leg, width)
-        hip = front - behind * ahead + sign * aside * left - below * up
+        hip = front - behind * ahead + LEFTWARD[side] * aside * left - below * up
         toe = recording.marker(known.markers["toe", side])
         heel = known.markers.get(("heel", side))
         every["thigh"].append(_apart(hip, knee))

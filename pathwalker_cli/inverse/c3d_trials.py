@@ -12,7 +12,8 @@ from pathwalker_cli.conventions import SIDES, SUFFIX, Condition, Side
 from pathwalker_cli.inverse.cycles import gait_cycles
 from pathwalker_cli.inverse.forces import foot_extents, ground_forces, plate_loads
 from pathwalker_cli.inverse.found_events import events_of_motion, set_by_plates
-from pathwalker_cli.inverse.marker_sets import KnownSet, recognised, set_points
+from pathwalker_cli.inverse.joint_centres import legs_in_plane
+from pathwalker_cli.inverse.marker_sets import KnownSet, leg_length, recognised, set_points
 from pathwalker_cli.inverse.markers import (
     MarkerPoint,
     bridge_gaps,
@@ -44,11 +45,10 @@ def c3d_trials(
         DataError: If the recording cannot be used.
     """
     raw, known, points = read_markers(path, patient, condition, config)
-    trials = []
-    for walk in walks(raw, points):
-        placed = set_points(known, patient, walk, condition) if known else points
-        trials.append((_walk_trial(walk, placed, patient, condition, config), raw))
-    return trials
+    return [
+        (_walk_trial(walk, known, points, patient, condition, config), raw)
+        for walk in walks(raw, points)
+    ]
 
 
 def read_markers(
@@ -76,6 +76,7 @@ def read_markers(
 
 def _walk_trial(
     walk: Recording,
+    known: KnownSet | None,
     points: tuple[MarkerPoint, ...],
     patient: Patient,
     condition: Condition,
@@ -84,16 +85,23 @@ def _walk_trial(
     """Return the trial of one pass in the walking plane."""
     names = tuple(point.marker for point in points)
     walk, gaps = bridge_gaps(walk, names, config.longest_gap)
+    flat = is_projected(walk, points)
+    fitted, ahead = walk, None
+    if known:
+        if not flat:
+            height = patient.height
+            fitted, ahead = legs_in_plane(walk, known.markers, leg_length(patient), height)
+        points = set_points(known, patient, fitted, condition)
     model: pin.Model = pinocchio_model(patient, condition)
     motion, distances, doubts = robust_kinematics(
-        model, walk, points, patient.height, config.longest_gap
+        model, fitted, points, patient.height, config.longest_gap
     )
     if not any(event.kind == "foot_strike" for event in walk.events):
         walk = _with_events(walk, model, motion)
-    aside = None if is_projected(walk, points) else _aside(walk, points)
-    forces = (
-        ground_forces(walk, model, motion, aside, mend=config.mend_plates) if walk.plates else None
-    )
+    forces = None
+    if walk.plates:
+        aside = None if flat else _aside(walk, points)
+        forces = ground_forces(walk, model, motion, aside, ahead, mend=config.mend_plates)
     return Trial(
         walk.name,
         motion,

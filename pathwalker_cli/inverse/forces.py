@@ -92,6 +92,7 @@ def ground_forces(
     model: pin.Model,
     motion: Trajectory,
     aside: Mapping[Side, np.ndarray] | None = None,
+    ahead: Mapping[Side, np.ndarray] | None = None,
     cutoff: float = FORCE_CUTOFF,
     mend: bool = False,
 ) -> GroundForces:
@@ -104,6 +105,8 @@ def ground_forces(
         aside: Per side, sideways position of the foot [m], shape (n,).  Without it the markers
             were laid into the walking plane, and the plates are turned to that of their axes for
             which the loads lie under the feet.
+        ahead: Per side, how far the foot stood ahead of the walker's [m], shape (n,); the centre of
+            pressure is given where it is under the walker's foot.
         cutoff: Cut-off frequency of the plates [Hz].
         mend: Whether to mend plates that are not stored as they stand.
 
@@ -113,6 +116,8 @@ def ground_forces(
     if not recording.plates:
         raise DataError("has no force plates", where=recording.name)
     feet, direction = foot_extents(model, motion.values), "+x"
+    if ahead is not None:
+        feet = {side: ends + ahead[side][:, None] for side, ends in feet.items()}
     loads = plate_loads(recording, cutoff)
     if aside is None:
         direction = plate_direction(loads, feet, recording.events)
@@ -138,7 +143,7 @@ def ground_forces(
         recording.first_frame,
     )
     judged = tuple(judge(stance, seen) for stance in stances(recording.events))
-    table = _compose(recording, judged, [load.force[:, [0, 2]] for load in loads], points)
+    table = _compose(recording, judged, [load.force[:, [0, 2]] for load in loads], points, ahead)
     return GroundForces(table, judged, direction, remarks)
 
 
@@ -240,6 +245,7 @@ def _compose(
     judged: Sequence[StanceForce],
     forces: Sequence[np.ndarray],
     points: np.ndarray,
+    ahead: Mapping[Side, np.ndarray] | None,
 ) -> Trajectory:
     """Return force and centre of pressure of both feet from measured stances and swings."""
     frames = recording.positions.shape[0]
@@ -252,5 +258,7 @@ def _compose(
             rows = slice(max(item.stance.strike - EDGE, 0), item.stance.toe_off + EDGE)
             point = points[rows, item.plate]
             force = np.where(np.isfinite(point)[:, None], forces[item.plate][rows], 0.0)
+            if ahead is not None:
+                point = point - ahead[item.stance.side][rows]
             feet[item.stance.side][rows] = np.column_stack([force, point])
     return force_columns(recording.time, feet)
