@@ -32,7 +32,7 @@ from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.markers import load_marker_set
 from pathwalker_cli.inverse.study import RecordedConfig
-from pathwalker_cli.inverse.text import trial_notes
+from pathwalker_cli.inverse.text import stance_notes
 from pathwalker_cli.io import c3d
 from pathwalker_cli.io.c3d_write import write_c3d as write_recording
 from pathwalker_cli.io.json_file import read_json
@@ -304,7 +304,7 @@ def test_recordings_with_anything_in_them_are_evaluated_or_refused(seed: int) ->
     def read(path: Path) -> None:
         for trial, _ in c3d_trials(path, patient, "barefoot", config):
             assert np.isfinite(trial.motion.values).all()
-            assert all(map(str.isprintable, (*trial_notes([trial]), *trial.doubts)))
+            assert all(map(str.isprintable, (*trial.remarks, *stance_notes(trial), *trial.doubts)))
 
     tried(read, "walk.c3d", (folder() / "walk.c3d").read_bytes())
 

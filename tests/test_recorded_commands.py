@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 import shutil
 from collections.abc import Callable
@@ -71,13 +72,18 @@ def test_import_finds_the_made_motion(tmp_path: Path) -> None:
     result = imported(write_c3d(tmp_path / "walk.c3d"), out)
     assert result.exception is None, result.output
     assert {path.name for path in out.iterdir()} == {
-        "walk_angles.csv", "walk_angles.mot", "walk_events.csv", "walk_residuals.csv",
+        "walk_angles.csv", "walk_angles.mot", "walk_events.csv", "walk_reading.json",
+        "walk_residuals.csv",
     }  # fmt: skip
     angles = read_trajectory(out / "walk_angles.csv")
     assert angles.values == pytest.approx(motion()[0], abs=1e-5)
     assert read_opensim(out / "walk_angles.mot").values == pytest.approx(angles.values, abs=1e-5)
     assert len(rows(out / "walk_residuals.csv")) == 18
     assert "has no force plates, so there are no forces" in result.output
+    reading = json.loads((out / "walk_reading.json").read_text(encoding="utf-8"))
+    assert (reading["trial"], reading["frames"], reading["strides"]) == ("walk", 120, 2)
+    assert reading["warnings"] == ["has no force plates, so there are no forces"]
+    assert (reading["notes"], reading["laboratory"]) == ([], [])
 
 
 def test_import_with_a_plate_writes_forces_and_says_why_they_are_unknown(tmp_path: Path) -> None:

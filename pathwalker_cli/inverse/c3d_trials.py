@@ -21,12 +21,12 @@ from pathwalker_cli.inverse.markers import (
     marker_points,
 )
 from pathwalker_cli.inverse.misplaced import robust_kinematics
-from pathwalker_cli.inverse.stance_checks import LOADED
 from pathwalker_cli.inverse.study import RecordedConfig
 from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.inverse.walk import is_projected, orientation_doubts, walks
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.c3d_checks import check_markers, readable_recording
+from pathwalker_cli.io.c3d_plates import LOADED
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.trajectory import Trajectory
@@ -102,6 +102,7 @@ def _walk_trial(
     if walk.plates:
         aside = None if flat else _aside(walk, points)
         forces = ground_forces(walk, model, motion, aside, ahead, mend=config.mend_plates)
+        walk = replace(walk, plates=forces.loads, samples_per_frame=1)
     return Trial(
         walk.name,
         motion,
@@ -112,8 +113,7 @@ def _walk_trial(
         stances=forces.stances if forces else (),
         markers=distances,
         gaps=gaps,
-        first_frame=walk.first_frame,
-        remarks=walk.remarks,
+        walk=walk,
         doubts=(
             *orientation_doubts(walk, points),
             *doubts,

@@ -14,17 +14,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.io.c3d import Recording
 
+Landmark = Literal["asis", "psis", "knee", "ankle", "toe", "heel", "c7", "clavicle"]
+"""What a marker stands for."""
+
 _BREADTHS: Final = {"knee": 0.0952 / 1.7018, "ankle": 0.0668 / 1.7018}
 """Breadth of a joint in body heights."""
 
-_ABOVE: Final = {"knee": "asis", "ankle": "knee"}
+_ABOVE: Final[Mapping[Landmark, Landmark]] = {"knee": "asis", "ankle": "knee"}
 """Landmark at the other end of the segment above a joint."""
 
 _MARKER: Final = 0.007
@@ -58,7 +61,7 @@ def beside_joint(joint: str, height: float) -> float:
 
 
 def legs_in_plane(
-    recording: Recording, legs: Mapping[tuple[str, Side], str], leg: float, height: float
+    recording: Recording, legs: Mapping[tuple[Landmark, Side], str], leg: float, height: float
 ) -> tuple[Recording, dict[Side, np.ndarray]]:
     """Return a recording whose legs hang below the middle of the pelvis, markers at the joints.
 

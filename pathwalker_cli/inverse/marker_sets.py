@@ -17,19 +17,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
 from pathwalker_cli.conventions import SIDES, SUFFIX, Condition, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.joint_centres import hip_centre
+from pathwalker_cli.inverse.joint_centres import Landmark, hip_centre
 from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import FootPoints
-
-Landmark = Literal["asis", "psis", "knee", "ankle", "toe", "heel", "c7", "clavicle"]
 
 _NEEDED: Final[tuple[Landmark, ...]] = ("asis", "psis", "knee", "ankle", "toe")
 

@@ -17,10 +17,7 @@ from pathwalker_cli.conventions import Side
 from pathwalker_cli.inverse.cycles import OTHER, Stance, single_support
 from pathwalker_cli.inverse.plate_checks import Footprint
 from pathwalker_cli.io.c3d_events import Event
-from pathwalker_cli.io.c3d_plates import ForcePlate
-
-LOADED: Final = 20.0
-"""Vertical force from which a plate counts as loaded [N]; about ten times its noise."""
+from pathwalker_cli.io.c3d_plates import LOADED, ForcePlate
 
 EDGE: Final = 3
 """Frames by which force and event may differ at either end of a stance."""

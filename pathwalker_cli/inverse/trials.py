@@ -83,7 +83,8 @@ def _walks(
     if still:
         aside = tuple(f"{error.where} is set aside: its {error.what}" for error in still)
         first, recording = found[0]
-        found[0] = replace(first, remarks=(*first.remarks, *aside)), recording
+        walk = first.walk and replace(first.walk, remarks=(*first.remarks, *aside))
+        found[0] = replace(first, walk=walk), recording
     return found
 
 

@@ -93,6 +93,7 @@ def cut(recording: Recording, first: int, end: int) -> Recording:
             for plate in recording.plates
         ),
         first_frame=recording.first_frame + first,
+        stored={name: values[first:end] for name, values in recording.stored.items()},
     )
 
 
