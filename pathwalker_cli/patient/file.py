@@ -25,6 +25,8 @@ from pathwalker_cli.patient.blocks import (
     FootPoints,
     OrthosisData,
     Recorded,
+    RockerRadius,
+    Roundness,
     SegmentLengths,
     Strengths,
 )
@@ -73,6 +75,8 @@ class Patient(YamlModel):
     height: Annotated[float, Quantity("m", 0.5, 2.2, above="is it in centimetres?")]
     segment_lengths: SegmentLengths = SegmentLengths()
     contact_points: ContactPoints = ContactPoints()
+    rocker_radius: RockerRadius = RockerRadius()
+    sole_roundness: Sides[Roundness] | None = None
     strengths: Strengths | None = None
     examination: Examination = Examination()
     orthosis: OrthosisData | None = None

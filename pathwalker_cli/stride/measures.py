@@ -67,7 +67,7 @@ def _peak_vertical_force(stride: Stride, side: Side) -> float:
 
 def _least_point_force(stride: Stride) -> float:
     """Return the least vertical force on a contact point in contact [N]."""
-    touching = contacts(tuple(stride.known("phase")))
+    touching = contacts(stride.walker, tuple(stride.known("phase")))
     return float(stride.known("point_force")[:, 1::2][touching].min())
 
 
@@ -103,7 +103,7 @@ def ankle_torque_line(stride: Stride, side: Side) -> tuple[float, float]:
     instant counts by its share of time.  Positive like a spring that resists dorsiflexion; NaN if
     the ankle does not move.
     """
-    rows = toe_bearing(tuple(stride.known("phase")), side)
+    rows = toe_bearing(stride.walker, tuple(stride.known("phase")), side)
     name = f"ankle_{SUFFIX[side]}"
     angle, weight = -stride.column(name)[rows], stride.weights[rows]
     torque = stride.known("net_torque")[rows, COORDINATES.index(name)]
