@@ -789,7 +789,9 @@ def test_recorded_gait_shows_stances_torques_and_strengths(recorded: Path, tmp_p
     assert section(page, "How the files were read").lines == (
         "barefoot, walk: plate 2 is left out.", "barefoot, walk: its path bends.",
     )  # fmt: skip
-    (copied / "barefoot" / "walk_reading.json").write_text('{"condition": "barefoot"}')
+    (copied / "barefoot" / "walk_reading.json").write_text(
+        '{"condition": "barefoot", "laboratory": [1]}'
+    )
     assert "_reading.json that cannot be used" in refusal(copied, "-o", tmp_path / "page.html")
     (copied / "barefoot" / "walk_reading.json").unlink()
     origin = json.loads((copied / "study.json").read_text())
