@@ -211,6 +211,10 @@ def test_there_and_back_are_two_passes(good: Trial, tmp_path: Path) -> None:
     first, second = evaluated(tmp_path / "walk.c3d")
     assert [first.name, second.name] == ["walk-1", "walk-2"]
     assert "turns round before frame" in said(first)
+    write_c3d(tmp_path / "walk-1.c3d", walk())
+    config = RecordedConfig(patient=SHIPPED, c3d=Paths(barefoot=(str(tmp_path),)))
+    trials = kinematics_trials(config, load_patient(SHIPPED), lambda _: None)
+    assert {trial.name for trial in trials} == {"walk-1", "walk-pass-1", "walk-pass-2"}
     for trial, begin in ((first, 0), (second, len(walk().positions))):
         row = trial.first_frame - 1 - begin
         own = angles(good)[row : row + len(angles(trial))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,9 +34,20 @@ from pathwalker_cli.trajectory import Trajectory
 
 
 def c3d_trials(
-    path: Path, patient: Patient, condition: Condition, config: RecordedConfig
+    path: Path,
+    patient: Patient,
+    condition: Condition,
+    config: RecordedConfig,
+    taken: Collection[str] = (),
 ) -> list[tuple[Trial, Recording]]:
     """Evaluate one C3D file: angles, events and, with force plates, forces, but no torques.
+
+    Args:
+        path: The file.
+        patient: The patient.
+        condition: What was worn.
+        config: What was chosen.
+        taken: Names of other recordings, which no pass takes.
 
     Returns:
         A trial for every pass, each with the recording as the file holds it.
@@ -47,7 +59,7 @@ def c3d_trials(
     raw, known, points = read_markers(path, patient, condition, config)
     return [
         (_walk_trial(walk, known, points, patient, condition, config), raw)
-        for walk in walks(raw, points)
+        for walk in walks(raw, points, taken)
     ]
 
 

@@ -71,11 +71,13 @@ def _walks(
     """
     found: list[tuple[Trial, Recording]] = []
     still: list[StandingError] = []
-    for path in c3d_files(config.c3d.of(condition)):
+    files = c3d_files(config.c3d.of(condition))
+    for path in files:
         if wanted(path.stem):
             progress(f"{condition} {path.stem}")
+            others = [file.stem for file in files if file != path]
             try:
-                found += c3d_trials(path, patient, condition, config)
+                found += c3d_trials(path, patient, condition, config, others)
             except StandingError as error:
                 still.append(error)
     if still and not found:
