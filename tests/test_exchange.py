@@ -76,7 +76,7 @@ def plain_points(path: Path) -> dict[str, np.ndarray]:
 def test_the_copy_holds_our_curves_beside_what_the_file_has(
     original: Path, trial: Trial, exchanged: Path
 ) -> None:
-    before, after = plain_points(original), plain_points(exchanged / "walk.c3d")
+    before, after = plain_points(original), plain_points(exchanged / "walk_pathwalker.c3d")
     for label, values in before.items():
         np.testing.assert_array_equal(after[label], values)
     for label, radians in angles(trial).items():
@@ -91,7 +91,7 @@ def test_the_copy_holds_our_curves_beside_what_the_file_has(
 
 
 def test_the_copy_is_read_as_the_file(original: Path, exchanged: Path) -> None:
-    file, copy = read_c3d(original), read_c3d(exchanged / "walk.c3d")
+    file, copy = read_c3d(original), read_c3d(exchanged / "walk_pathwalker.c3d")
     assert (copy.markers, copy.events, copy.rate) == (file.markers, file.events, file.rate)
     np.testing.assert_array_equal(copy.positions, file.positions)
     np.testing.assert_array_equal(copy.plates[0].force, file.plates[0].force)
@@ -115,7 +115,7 @@ def test_channels_with_offsets_keep_their_loads(original: Path, tmp_path: Path) 
 def test_ours_do_not_take_the_names_of_theirs(
     original: Path, exchanged: Path, trial: Trial, tmp_path: Path
 ) -> None:
-    names = write_copy(tmp_path / "twice.c3d", exchanged / "walk.c3d", angles(trial), 1)
+    names = write_copy(tmp_path / "twice.c3d", exchanged / "walk_pathwalker.c3d", angles(trial), 1)
     assert all(name.endswith("Angles_PathWalker") for name in names)
     twice = read_c3d(tmp_path / "twice.c3d")
     assert twice.markers == read_c3d(original).markers
@@ -123,7 +123,7 @@ def test_ours_do_not_take_the_names_of_theirs(
 
 
 def test_markers_for_opensim(trial: Trial, exchanged: Path) -> None:
-    lines = (exchanged / "walk.trc").read_text(encoding="utf-8").splitlines()
+    lines = (exchanged / "walk_markers.trc").read_text(encoding="utf-8").splitlines()
     facts = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=True))
     assert trial.walk is not None
     names = [name for name in lines[3].split("\t")[2:] if name]

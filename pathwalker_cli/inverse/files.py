@@ -138,11 +138,11 @@ def write_exchange(folder: Path, trial: Trial, body_mass: float) -> None:
     if trial.walk is None or trial.walk.source is None:
         return
     stem = str(folder / trial.name)
-    write_trc(f"{stem}.trc", trial.walk)
+    write_trc(f"{stem}_markers.trc", trial.walk)
     if trial.walk.plates:
         write_opensim(f"{stem}_plates.mot", plate_table(trial.motion.time, trial.walk.plates))
     curves = angles(trial) | moments(trial, body_mass)
-    write_copy(Path(f"{stem}.c3d"), trial.walk.source, curves, trial.first_frame)
+    write_copy(Path(f"{stem}_pathwalker.c3d"), trial.walk.source, curves, trial.first_frame)
 
 
 def _marker_rows(trial: Trial) -> list[list[object]]:

@@ -223,8 +223,13 @@ def _unit(parameters: Any, path: Path) -> float:
 def _scale(kind: str, parameters: Any) -> float:
     """Return what makes values that a model computed SI; 1 where it does not matter."""
     parameter, units = STORED.get(kind, ("", {"": 1.0}))
-    named = parameters["POINT"].get(parameter, {}).get("value") or [""]
-    return units.get(str(named[0]).lower(), next(iter(units.values())))
+    return units.get(unit_of(parameter, parameters["POINT"]), next(iter(units.values())))
+
+
+def unit_of(parameter: str, point: Mapping[str, Any]) -> str:
+    """Return the unit that a parameter of the group POINT names, in small letters; "" without."""
+    named = [*np.ravel(point[parameter]["value"] if parameter in point else ()), ""][0]
+    return str(named).strip().lower()
 
 
 def _seen(points: np.ndarray, unit: float) -> np.ndarray:

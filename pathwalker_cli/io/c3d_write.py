@@ -8,7 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.io.c3d import STORED, Recording, open_c3d
+from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.c3d import STORED, Recording, open_c3d, unit_of
 from pathwalker_cli.io.c3d_events import Event, EventKind, continued
 from pathwalker_cli.io.c3d_plates import METRES, ForcePlate, analog_channels, plate_axes
 
@@ -100,7 +101,7 @@ def write_copy(
         The names in the copy: where the file has one of them, all of them end in "_PathWalker".
 
     Raises:
-        DataError: If the file cannot be read.
+        DataError: If the file cannot be read, or holds what the library does not write.
     """
     file = open_c3d(source)
     point, data = file["parameters"]["POINT"], file["data"]
@@ -111,9 +112,9 @@ def write_copy(
     for row, (name, values) in zip(added.swapaxes(0, 1), curves.items(), strict=True):
         parameter, units = next(unit for end, unit in STORED.items() if name.endswith(end))
         usual = next(iter(units))
-        if parameter not in point:
+        if unit_of(parameter, point) not in units:
             file.add_parameter("POINT", parameter, [_SPELT[usual]])
-        unit = units.get(str(point[parameter]["value"][0]).lower(), units[usual])
+        unit = units[unit_of(parameter, point)]
         known = np.flatnonzero(np.isfinite(values))
         row[:, first + known] = 0.0
         row[0, first + known] = values[known] / unit
@@ -131,5 +132,9 @@ def write_copy(
     point["SCALE"]["value"] = [-1.0]  # points become floats, offsets of channels 0
     if data["analogs"].size:
         data["analogs"] = analog_channels(file).T[None]
-    file.write(str(path))
+    try:
+        file.write(str(path))
+    except (RuntimeError, NotImplementedError, LookupError, TypeError, ValueError) as problem:
+        reason = str(problem).strip().partition("\n")[0]
+        raise DataError(f"cannot be copied: {reason}", where=str(source)) from None
     return names
