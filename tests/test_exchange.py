@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from opensim_tables import read_opensim
 from pathwalker_cli.cli import cli
 from pathwalker_cli.inverse.laboratory import angles, differences, moments
 from pathwalker_cli.inverse.trial import Trial
@@ -137,9 +138,7 @@ def test_markers_for_opensim(trial: Trial, exchanged: Path) -> None:
 
 
 def test_plates_for_opensim(trial: Trial, exchanged: Path) -> None:
-    path = exchanged / "walk_plates.mot"
-    names = path.read_text(encoding="utf-8").splitlines()[6].split("\t")
-    table = dict(zip(names, np.loadtxt(path, skiprows=7).T, strict=True))
+    table = read_opensim(exchanged / "walk_plates.mot")
     assert trial.forces is not None
     (stance,) = [item.stance for item in trial.stances if item.measured]
     side = "r" if stance.side == "right" else "l"

@@ -36,7 +36,6 @@ from pathwalker_cli.inverse.text import stance_notes
 from pathwalker_cli.io import c3d
 from pathwalker_cli.io.c3d_write import write_c3d as write_recording
 from pathwalker_cli.io.json_file import read_json
-from pathwalker_cli.io.opensim import read_opensim
 from pathwalker_cli.io.recordings import read_compact
 from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.io.yaml_file import read_mapping
@@ -135,7 +134,6 @@ READERS: Final[dict[str, tuple[Read, str, Callable[[], bytes]]]] = {
     "trajectory": (read_trajectory, "made.csv", lambda: angles().encode()),
     "angles": (compact, "walk_angles.csv", lambda: angles().encode()),
     "events": (compact, "run_events.csv", lambda: EVENTS),
-    "opensim": (read_opensim, "made.mot", lambda: b"made\nnRows=1\nendheader\ntime\tx\n0\t1\n"),
     "motion": (read_motion, "made.npz", motion),
     "multipliers": (read_multipliers, "made.npz", lambda: arrays(unknowns=[1.0], rows=[2.0])),
     "metrics": (read_json, "made.json", lambda: json.dumps({"a": [1, None], "b": "x"}).encode()),

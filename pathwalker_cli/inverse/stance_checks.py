@@ -138,12 +138,6 @@ def _struck(plate: int, strike: int, side: Side, seen: Evidence) -> bool:
     moves on smoothly, the load jumps ahead: the second foot adds its load times the distance
     between the feet to the moment about where the load was before.  A foot that stands beside the
     plate does neither, however far the other one rolls.
-
-    Args:
-        plate: Index of the plate.
-        strike: Frame of the foot strike.
-        side: Side of the foot.
-        seen: Loads and feet.
     """
     rows = slice(max(strike - EDGE, 0), strike + 2 * EDGE + 1)
     load, point, foot = seen.up[rows, plate], seen.points[rows, plate], seen.feet[side]

@@ -8,18 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from pathwalker_cli.conventions import SIDES, SUFFIX, TRANSLATIONS
-from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.c3d_plates import LOADED, ForcePlate, centre_of_pressure
 from pathwalker_cli.trajectory import Trajectory
-
-_END: Final = "endheader"
 
 
 def write_opensim(path: str | Path, table: Trajectory, digits: int = 8) -> None:
@@ -36,7 +32,7 @@ def write_opensim(path: str | Path, table: Trajectory, digits: int = 8) -> None:
         f"nRows={table.time.size}",
         f"nColumns={len(table.names) + 1}",
         "inDegrees=no",
-        _END,
+        "endheader",
         "\t".join(("time", *table.names)),
     ]
     rows = np.column_stack([table.time, table.values])
@@ -44,47 +40,6 @@ def write_opensim(path: str | Path, table: Trajectory, digits: int = 8) -> None:
         file.write("\n".join(header) + "\n")
         for row in rows:
             file.write("\t".join(f"{value:.{digits}g}" for value in row) + "\n")
-
-
-def read_opensim(path: str | Path) -> Trajectory:
-    """Read a table written by OpenSim or by `write_opensim`; units are unknown and left empty.
-
-    Raises:
-        DataError: If the file is no such table, is in degrees, or ends early.
-    """
-    path = Path(path)
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as problem:
-        raise DataError(f"cannot be read: {problem}", where=str(path)) from None
-    stripped = [line.strip() for line in lines]
-    if _END not in stripped or stripped.index(_END) + 1 >= len(lines):
-        raise DataError(f"has no line '{_END}' with column names below", where=str(path))
-    end = stripped.index(_END)
-    pairs = (line.partition("=") for line in stripped[:end])
-    entries = {key: value for key, equals, value in pairs if equals}
-    if entries.get("inDegrees", "no") != "no":
-        raise DataError("is in degrees", where=str(path), allowed="inDegrees=no")
-    names = tuple(lines[end + 1].split())
-    values = _numbers(lines[end + 2 :], len(names), path)
-    rows = entries.get("nRows", str(len(values)))
-    if rows.strip() != str(len(values)):
-        raise DataError(f"has {len(values)} rows", where=str(path), allowed=f"nRows={rows}")
-    try:
-        return Trajectory(values[:, 0], names[1:], values[:, 1:], ("",) * (len(names) - 1))
-    except ValueError as problem:
-        raise DataError(str(problem), where=str(path)) from None
-
-
-def _numbers(lines: list[str], columns: int, path: Path) -> np.ndarray:
-    """Return the rows below the column names, shape (n, columns)."""
-    try:
-        rows = [[float(cell) for cell in line.split()] for line in lines if line.strip()]
-    except ValueError as problem:
-        raise DataError(f"holds a cell that is no number: {problem}", where=str(path)) from None
-    if not rows or {len(row) for row in rows} != {columns}:
-        raise DataError("has rows of another length", where=str(path), allowed=f"{columns} cells")
-    return np.array(rows)
 
 
 def force_table(forces: Trajectory) -> Trajectory:
