@@ -396,7 +396,7 @@ def with_turning_pelvis(degrees: float) -> Recording:
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     aside = hip_centre(leg_length(load_patient(SHIPPED)), 0.2)[1]
     levers = dict.fromkeys(("TOE", "HEE", "THI", "TIB"), aside) | {"ASI": 0.1}
-    levers |= {joint: aside + beside_joint(n, 1.25) for n, joint in JOINTS.items()}
+    levers |= {mark: aside + beside_joint(n, "left", 1.25, {}) for n, mark in JOINTS.items()}
     middle = walk().marker("LASI")
     for side, sign in (("R", -1.0), ("L", 1.0)):
         for name, lever in levers.items():
@@ -416,6 +416,13 @@ def test_a_pelvis_that_turns_does_not_bend_the_legs(tmp_path: Path) -> None:
         (trial,) = evaluated(tmp_path / "walk.c3d")
         every.append(angles(trial))
     assert np.degrees(np.abs(every[1] - every[0])[:, 1:]).max() < 2.0
+
+
+def test_the_file_tells_the_breadth_of_joints() -> None:
+    told = {"LKneeWidth": 90.0, "RKneeWidth": 9.0}  # the right one is in cm
+    usual = beside_joint("knee", "right", 1.5, {})
+    assert beside_joint("knee", "left", 1.5, told) == pytest.approx(0.052)
+    assert beside_joint("knee", "right", 1.5, told) == usual == pytest.approx(0.049, abs=1e-3)
 
 
 def test_the_closest_set_is_named_with_what_it_lacks() -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import GRAVITY, SIDES, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.joint_centres import LEFTWARD, hip_centre
+from pathwalker_cli.inverse.joint_centres import LEFTWARD, beside_joint, hip_centre
 from pathwalker_cli.inverse.marker_sets import (
     KnownSet,
     foot_places,
@@ -109,7 +109,7 @@ def measured_body(
     height = _told(recording, _HEIGHT, height, "height", sources)
     if height is None:
         height = _from_neck(recording, known, sources)
-    lengths = _lengths(recording, known)
+    lengths = _lengths(recording, known, height or _CHILD)
     name = recording.name
     sources += [
         f"thigh, shank: {name}, hip joint centres by Davis et al. (1991)",
@@ -175,7 +175,9 @@ def _from_neck(recording: Recording, known: KnownSet, sources: list[str]) -> flo
     return round(height, 3)
 
 
-def _lengths(recording: Recording, known: KnownSet) -> dict[str, tuple[float, float]]:
+def _lengths(
+    recording: Recording, known: KnownSet, body_height: float
+) -> dict[str, tuple[float, float]]:
     """Return the lengths of both sides [m], medians over the frames."""
     front, back = known.middle("asis", recording), known.middle("psis", recording)
     spines = [recording.marker(known.markers["asis", side]) for side in SIDES]
@@ -201,7 +203,8 @@ def _lengths(recording: Recording, known: KnownSet) -> dict[str, tuple[float, fl
         hip = front - behind * ahead + LEFTWARD[side] * aside * left - below * up
         toe = recording.marker(known.markers["toe", side])
         heel = known.markers.get(("heel", side))
-        every["thigh"].append(_apart(hip, knee))
+        beside = beside_joint("knee", side, body_height, recording.numbers)
+        every["thigh"].append(round(float(np.sqrt(_apart(hip, knee) ** 2 - beside**2)), 3))
         every["shank"].append(_apart(knee, ankle))
         every["foot"].append(
             _apart(recording.marker(heel), toe) if heel else _apart(ankle, toe) / _TO_TOE

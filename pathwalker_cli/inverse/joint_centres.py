@@ -55,9 +55,20 @@ def hip_centre(leg: float, width: float = 0.0) -> tuple[float, float, float]:
     return float(behind), float(width / 2.0 - size * np.sin(theta)), float(below)
 
 
-def beside_joint(joint: str, height: float) -> float:
-    """Return how far the marker of a knee or ankle stands beside the joint [m], 0 of others."""
-    return _BREADTHS[joint] * height / 2.0 + _MARKER if joint in _BREADTHS else 0.0
+def beside_joint(joint: str, side: Side, height: float, numbers: Mapping[str, float]) -> float:
+    """Return how far the marker of a knee or ankle stands beside the joint [m].
+
+    By the breadth that the file tells, e.g. LKneeWidth [mm], else by the height of the body.
+
+    Args:
+        joint: "knee" or "ankle".
+        side: The side.
+        height: Height of the body [m].
+        numbers: What the file says about the subject.
+    """
+    told = 1e-3 * numbers.get(f"{side[0].upper()}{joint.capitalize()}Width", 0.0)
+    usual = _BREADTHS[joint] * height
+    return (told if 0.5 < told / usual < 2.0 else usual) / 2.0 + _MARKER
 
 
 def legs_in_plane(
@@ -90,7 +101,8 @@ def legs_in_plane(
             shift = aside * axis
             if landmark in _ABOVE:
                 along = path - recording.marker(legs[_ABOVE[landmark], side])
-                shift = shift + beside_joint(landmark, height) * _across(axis, along)
+                beside = beside_joint(landmark, side, height, recording.numbers)
+                shift = shift + beside * _across(axis, along)
             positions[:, recording.markers.index(marker)] = path - LEFTWARD[side] * shift
     positions.setflags(write=False)
     ahead = {side: LEFTWARD[side] * aside * axis[:, 0] for side in SIDES}
