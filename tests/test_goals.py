@@ -17,7 +17,10 @@ from pathwalker_cli.gait.cost_terms import goal_values, with_goal_costs
 from pathwalker_cli.gait.costs import GOALS, Costs, Instant, Totals
 from pathwalker_cli.gait.solve import solve_study
 from pathwalker_cli.model.contact import PHASES, POINTS, phase_named
+from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.ocp.phased import PhasedMotion
+from pathwalker_cli.stride.measures import metrics_of
+from pathwalker_cli.stride.stride import stride_of
 
 WALKER = stylised_series("barefoot").walker
 WEIGHT = WALKER.weight
@@ -29,7 +32,7 @@ N = len(COORDINATES)
 def expected(motion: PhasedMotion) -> dict[str, float]:
     """Return all values by the formulas of docs/theory.md, by trapezoids on a fine grid."""
     crouch = pressure = peak = discomfort = first = stumbling = 0.0
-    differences, loads = np.zeros(3), np.zeros(2)
+    differences = np.zeros(3)
     for i, phase in enumerate(motion.phases):
         at = np.linspace(0.0, 1.0, 2001)
         x, a = phase.states_at(at), phase.smooth_at(at)
@@ -44,8 +47,6 @@ def expected(motion: PhasedMotion) -> dict[str, float]:
         force = phase.algebraic[0, 0, N : N + len(contact.forces)]
         load = dict(zip(contact.force_names, force, strict=True))
         for s in "rl":
-            foot = [sum(load.get(f"{p}_{s}_{axis}", 0.0) for p in ("heel", "toe")) for axis in "xz"]
-            loads += [over((force / WEIGHT) ** 2) for force in foot]
             arm = load.get(f"toe_{s}_z", 0.0) - load.get(f"heel_{s}_z", 0.0)
             pressure += over((arm / WEIGHT) ** 2)
         peak += over((a**8).sum(axis=1))
@@ -71,8 +72,6 @@ def expected(motion: PhasedMotion) -> dict[str, float]:
     asymmetry += float(((differences / time) ** 2).sum())
     return {
         "clear_ground": stumbling / distance,
-        "foot_load": loads[1] / distance,
-        "foot_shear": loads[0] / distance,
         "crouch": crouch / time,
         "asymmetry": asymmetry,
         "centre_of_pressure": pressure / time,
@@ -93,6 +92,35 @@ def test_values_are_those_of_the_formulas() -> None:
     assert "discomfort" not in goal_values(motion, WALKER, {})
 
 
+def test_cuffs_press_with_the_torque_over_their_height() -> None:
+    series = stylised_series("orthosis")
+    walker, stride = series.walker, stride_of(series)
+    height, weight = walker.patient.cuff_height("right"), walker.weight
+    assert height == pytest.approx(0.7 * 0.2834)
+    found = metrics_of(stride)
+    torque = series.orthosis_torque
+    assert found["peak_shin_force_right"] == pytest.approx(max(torque[:, 0].max(), 0.0) / height)
+    assert found["peak_calf_force_right"] == pytest.approx(max(-torque[:, 0].min(), 0.0) / height)
+    largest = max(found["peak_shin_force_right"], found["peak_calf_force_right"])
+    assert found["peak_cuff_pressure_right"] == pytest.approx(largest / walker.patient.cuff_area)
+    heights = np.array([walker.patient.cuff_height(side) for side in ("right", "left")])
+    squares = ((torque / heights / weight) ** 2).sum(axis=1)
+    value = goal_values(series.motion, walker, {})["cuff_load"]
+    assert value == pytest.approx(series.quadrature @ squares / stride.distance, rel=1e-9)
+    assert value > 0.0
+    assert goal_values(stylised_series("barefoot").motion, WALKER, {})["cuff_load"] == 0.0
+    assert metrics_of(stride_of(stylised_series("barefoot")))["peak_shin_force_right"] is None
+
+
+def test_the_strike_index_tells_heel_from_toe() -> None:
+    found = metrics_of(stride_of(stylised_series("barefoot")))
+    assert found["strike_index_right"] == pytest.approx(0.0, abs=1e-9)  # lands on its heel
+    flat = build_walker(WALKER.patient, feet="sole")
+    assert flat.contact_points(np.zeros(N))[0, 0] == pytest.approx(
+        flat.foot_points(np.zeros(N))[:2, 0].mean()
+    )
+
+
 def test_running_costs_of_a_start_add_up_to_the_values() -> None:
     motion = with_goal_costs(stylised_series("barefoot").motion, EVERY, WALKER)
     costs = dict(zip(EVERY.integrals, motion.phases[-1].integrals[-1], strict=True))
@@ -111,16 +139,20 @@ def test_derivatives_of_running_costs_are_those_of_differences(name: str, phase:
     goals, rng = Costs((name,), comfort_ranges=RANGES), np.random.default_rng(4)
     sizes = [N, N, len(GENERATORS), len(phase.forces)]
     point = np.concatenate([rng.uniform(0.1, 0.9, sum(sizes[:3])), 100 * rng.random(sizes[3])])
-    numbers = list(goals.numbers(WEIGHT))
+    numbers = list(goals.numbers(WALKER))
 
     def costs(x: np.ndarray) -> np.ndarray:
         parts = [list(part) for part in np.split(x, np.cumsum(sizes)[:-1])]
-        point = Instant(phase, *parts, heights=parts[0][:2], speeds=parts[1][:2])
+        point = Instant(
+            phase, *parts, heights=parts[0][:2], speeds=parts[1][:2], worn=parts[0][2:4]
+        )
         return np.array(goals.integrands(point, numbers, goals.goals), dtype=float)
 
     x = ca.SX.sym("x", sum(sizes))
     parts = [ca.vertsplit(part) for part in ca.vertsplit(x, [0, *np.cumsum(sizes).tolist()])]
-    point_of_symbols = Instant(phase, *parts, heights=parts[0][:2], speeds=parts[1][:2])
+    point_of_symbols = Instant(
+        phase, *parts, heights=parts[0][:2], speeds=parts[1][:2], worn=parts[0][2:4]
+    )
     symbols = ca.vertcat(*goals.integrands(point_of_symbols, numbers, goals.goals))
     jacobian = np.asarray(ca.Function("j", [x], [ca.jacobian(symbols, x)])(point))
     assert np.asarray(ca.Function("c", [x], [symbols])(point)).ravel() == pytest.approx(

@@ -679,7 +679,9 @@ def test_discomfort_is_smooth_and_grows_outside_the_range(
         q[COORDINATES.index("knee_r")] = angle
         zeros = [0.0] * len(GENERATORS)
         point = Instant(PHASES[0], q, q, zeros, zeros)
-        return goals.integrands(point, goals.numbers(300.0), goals.goals)[0]
+        return goals.integrands(
+            point, goals.numbers(stylised_series("barefoot").walker), goals.goals
+        )[0]
 
     angle = ca.SX.sym("angle")
     hessian, gradient = ca.hessian(cost(angle), angle)

@@ -109,9 +109,11 @@ def _goal_gains(phase: PhaseMotion, costs: Costs, walker: Walker) -> np.ndarray:
     places = walker.contact_motion(q.reshape(-1, n).T, v.reshape(-1, n).T)
     position, velocity = (np.asarray(values).T.reshape(*shape, -1) for values in places)
     heights, speeds = position[..., 1::2][..., air], velocity[..., ::2][..., air]
-    columns = q, v, activation, force, rate, excitation, vdot, reserve, q, heights, speeds
+    elements = walker.element_forces(*(x.reshape(-1, x.shape[-1]) for x in (q, v, activation)))
+    worn = elements[:, walker.columns(walker.device.forces)].reshape(*shape, -1)
+    columns = q, v, activation, force, rate, excitation, vdot, reserve, q, heights, speeds, worn
     point = Instant(contact, *(list(np.moveaxis(values, -1, 0)) for values in columns))
-    running = costs.integrands(point, list(costs.numbers(walker.weight)), costs.goals)
+    running = costs.integrands(point, list(costs.numbers(walker)), costs.goals)
     values = np.array([np.broadcast_to(cost, shape) for cost in running])
     steps, weights = phase.duration * np.diff(phase.mesh), quadrature_weights(phase.degree)[1]
     return np.asarray(np.einsum("kij,i,j->ik", values.reshape(-1, *shape), steps, weights))

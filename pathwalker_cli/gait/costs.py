@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, LEG_
 from pathwalker_cli.gait import choices
 from pathwalker_cli.model.contact import ContactPhase
 from pathwalker_cli.model.skeleton import SIDES
+
+if TYPE_CHECKING:
+    from pathwalker_cli.model.walker import Walker
 
 Weights = Mapping[str, float]
 """Weight of every term by its name; what is missing counts nothing."""
@@ -39,6 +42,7 @@ class Instant:
         reference: Coordinates that are followed, 10 entries [m, rad].
         heights: Heights of the places in the air, in the order of the walker's pattern [m].
         speeds: Their forward velocities [m/s].
+        worn: Torques of the orthoses right, left [N m]; none barefoot.
         power: Power of the activations in the effort.
         data: Numbers of the term, see `CostTerm.size`.
     """
@@ -55,6 +59,7 @@ class Instant:
     reference: Sequence[Any] = ()
     heights: Sequence[Any] = ()
     speeds: Sequence[Any] = ()
+    worn: Sequence[Any] = ()
     power: int = field(default=2, kw_only=True)
     data: Sequence[Any] = ()
 
@@ -274,16 +279,10 @@ def _stumbling(point: Instant) -> tuple[Any, ...]:
     return (sum(near, 0.0 * point.q[0]),)
 
 
-def _load(axis: str) -> Callable[[Instant], tuple[Any, ...]]:
-    """Return the squares of the forces on the feet in a direction as a running cost [-]."""
-
-    def squares(point: Instant) -> tuple[Any, ...]:
-        forces = list(zip(point.phase.forces, point.force, strict=True))
-        feet = (sum(x for f, x in forces if (f.point.side, f.axis) == (side, axis))
-                for side in point.phase.feet)  # fmt: skip
-        return (sum((force / point.data[0]) ** 2 for force in feet),)
-
-    return squares
+def _cuff_load(point: Instant) -> tuple[Any, ...]:
+    weight, *heights = point.data
+    forces = (torque / (h * weight) for torque, h in zip(point.worn, heights, strict=False))
+    return (sum((force**2 for force in forces), 0.0 * point.q[0]),)
 
 
 def _mean(name: str) -> Callable[[Totals], Any]:
@@ -316,14 +315,10 @@ GOALS: Final[dict[str, CostTerm]] = {
         "of it at 1.5 cm of height and hardly any above 4, per distance",
         ("stumbling",), _stumbling, _of("stumbling"), "m/s", per_distance=True,
     ),
-    "foot_load": CostTerm(
-        "share the load between the feet: squared vertical forces on them in body weights, per "
+    "cuff_load": CostTerm(
+        "spare the leg under the cuff: squared forces of the orthoses' cuffs in body weights, per "
         "distance",
-        ("foot_load",), _load("z"), _of("foot_load"), "s/m", size=1, per_distance=True,
-    ),
-    "foot_shear": CostTerm(
-        "neither brake nor push: squared fore-aft forces on the feet in body weights, per distance",
-        ("foot_shear",), _load("x"), _of("foot_shear"), "s/m", size=1, per_distance=True,
+        ("cuff_load",), _cuff_load, _of("cuff_load"), "s/m", size=3, per_distance=True,
     ),
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",
@@ -400,15 +395,14 @@ class Costs:
         """How many numbers the terms take."""
         return sum(term.size for term in self.terms.values())
 
-    def numbers(self, weight: float) -> np.ndarray:
-        """Return the numbers of all terms for a body weight, orthosis included [N], (size,)."""
+    def numbers(self, walker: Walker) -> np.ndarray:
+        """Return the numbers of all terms for a walker, shape (size,)."""
         wide = (-choices.NO_EDGE, choices.NO_EDGE)
         ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
         known = {
             "upright_trunk": [self.trunk_lean],
-            "foot_load": [weight],
-            "foot_shear": [weight],
-            "centre_of_pressure": [weight],
+            "centre_of_pressure": [walker.weight],
+            "cuff_load": [walker.weight, *(walker.patient.cuff_height(side) for side in SIDES)],
             "discomfort": np.array(ranges).T.ravel(),
         }
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])

@@ -84,7 +84,7 @@ class _Constants:
                 numbers,
                 [friction],
                 [weights.get(name, 0.0) for name in costs.weighed],
-                costs.numbers(walker.weight),
+                costs.numbers(walker),
                 *map(walker.body_slopes, self.moving),
             ]
         )
@@ -192,8 +192,8 @@ class GaitProblem:
         return theta
 
     @cached_property
-    def _torques(self) -> tuple[ca.SX, FrozenTerms]:
-        """Generalised forces of all elements (10,) [N, N m], with frozen curves."""
+    def _torques(self) -> tuple[ca.SX, ca.SX, FrozenTerms]:
+        """Forces of all elements [N m] and their sum (10,) [N, N m], with frozen curves."""
         frozen, walker = FrozenTerms(), self.walker
         moving = ca.vertcat(self.states.symbol, self.activations.symbol, self.parameters.symbol)
 
@@ -207,7 +207,7 @@ class GaitProblem:
         forces = element_forces(walker.elements, state, numbers, curve)
         names = walker.skeleton.coordinates
         total = generalised_forces(walker.elements, forces, names, ca.SX(1, 1))
-        return ca.vertcat(*total), frozen
+        return ca.vertcat(*forces), ca.vertcat(*total), frozen
 
     def _phase(self, contact: ContactPhase, following: ContactPhase) -> Phase:
         body, theta = self.walker.rigid_body, self._theta
@@ -216,7 +216,7 @@ class GaitProblem:
         sizes = choices.ACCELERATION_SIZE, choices.CONTACT_FORCE_SIZE, choices.FORCE_SIZE
         z = Variables.make("z", names, np.repeat(sizes, counts))
         vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
-        tau, frozen = self._torques
+        _, tau, frozen = self._torques
         jacobian = self._of(body.point_jacobian(self.q, theta), contact.forces)
         balance = body.inverse_dynamics(self.q, self.v, vdot, theta) - tau - reserve
         balance -= jacobian.T @ force
@@ -260,7 +260,8 @@ class GaitProblem:
         columns = (self.q, self.v, a, force, rate, excitation_from_rate(rate, a), vdot, reserve)
         air = self.pattern.in_the_air(contact)
         heights, speeds = position[[2 * i + 1 for i in air]], velocity[[2 * i for i in air]]
-        known = *columns, self.reference, heights, speeds
+        worn = self._torques[0][self.walker.columns(self.walker.device.forces)]
+        known = *columns, self.reference, heights, speeds, worn
         point = Instant(contact, *(ca.vertsplit(x) if x.numel() else [] for x in known))
         numbers = ca.vertsplit(self.constants.cost_numbers)
         return ca.vertcat(*self.costs.integrands(point, numbers))

@@ -202,6 +202,8 @@ class OrthosisData(YamlModel):
     stiffness_guess: Springs
     stiffness_range: SpringRange
     springs: SpringSet | None = None
+    cuff_height: Sides[Length] | None = None
+    cuff_area: Annotated[float, Quantity("m^2", 1e-4, 0.1, above="is it in cm^2?")] | None = None
 
     @model_validator(mode="after")
     def _springs(self) -> OrthosisData:

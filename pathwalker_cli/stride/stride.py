@@ -216,10 +216,13 @@ class Stride(Sampled):
             return self._heel("right", self.time[-1]) - middle
         return middle - self._heel("right", self.time[0])
 
+    def pose(self, time: float) -> np.ndarray:
+        """Return the generalised coordinates at an instant [s], shape (10,)."""
+        return self._at(self.q, np.array([time]))[0]
+
     def _heel(self, side: Side, time: float) -> float:
         """Return the forward position of a heel [m] at an instant [s]."""
-        pose = self._at(self.q, np.array([time]))[0]
-        return float(self.walker.foot_points(pose)[2 * SIDES.index(side), 0])
+        return float(self.walker.foot_points(self.pose(time))[2 * SIDES.index(side), 0])
 
     def _between(self, values: np.ndarray, first: float, last: float, points: int) -> np.ndarray:
         """Return columns at some instants, those after the end taken from the beginning."""
