@@ -179,4 +179,5 @@ def _over(every: Sequence[Difference], what: str) -> str:
         return "-"
     values = np.array([getattr(each, what) for each in every])
     over = values.mean() if what == "offset" else np.sqrt(np.mean(values**2))
-    return f"{over:.{1 if every[0].unit == 'deg' else 2}f}"
+    digits = 1 if every[0].unit == "deg" else 2
+    return f"{round(float(over), digits) + 0.0:.{digits}f}"  # no -0.0
