@@ -83,9 +83,6 @@ def _as_text(value: Any) -> Any:
 TrialName = Annotated[str, BeforeValidator(_as_text)]
 
 
-Uses = Sides[Use]  # named at the top of a module, its values can be pickled
-
-
 class ModelConfig(YamlModel):
     """Which model is built."""
 
@@ -94,7 +91,7 @@ class ModelConfig(YamlModel):
     tissue: bool = False
     elements: Annotated[tuple[str, ...], AS_TUPLE] = ()
     feet: Feet = "points"
-    contact: Uses = Uses(right="heel_toe", left="heel_toe")
+    contact: Sides[Use] = Sides[Use](right="heel_toe", left="heel_toe")
 
     @property
     def uses(self) -> Contact:
