@@ -13,7 +13,7 @@ import pytest
 
 from helpers import GAIT, stylised_series
 from pathwalker_cli.animation.frames import gait_frames
-from pathwalker_cli.animation.html import html_page
+from pathwalker_cli.animation.html import Video, html_page
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
 HOSTILE = "</script><img src=x onerror=alert(1)>"
@@ -237,3 +237,48 @@ def test_it_fits_the_screen(browser: Any, page_file: Path, width: int, beside: b
         assert 0 <= box["y"] <= box["y"] + box["height"] <= 900
     opened.page.close()
     assert opened.troubles == []
+
+
+RECORD = """async () => {
+  const canvas = document.createElement("canvas");
+  const drawing = setInterval(() => canvas.getContext("2d").fillRect(0, 0, 9, 9), 20);
+  const recorder = new MediaRecorder(canvas.captureStream(30), { mimeType: "video/webm" });
+  const parts = [];
+  recorder.ondataavailable = (event) => parts.push(event.data);
+  recorder.start();
+  await new Promise((after) => setTimeout(after, 2500));
+  const done = new Promise((after) => { recorder.onstop = after; });
+  recorder.stop();
+  await done;
+  clearInterval(drawing);
+  return [...new Uint8Array(await new Blob(parts).arrayBuffer())];
+}"""
+"""Returns the bytes of a video of two seconds and more."""
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_video_is_shown_at_the_instant_of_the_walker(
+    browser: Any, tmp_path: Path, there: bool
+) -> None:
+    if there:
+        recorder = browser.new_page()
+        (tmp_path / "child.webm").write_bytes(bytes(recorder.evaluate(RECORD)))
+        recorder.close()
+    frames = gait_frames(stylised_series("barefoot"), "run", "mapd-barefoot", 110)
+    file = tmp_path / "page.html"
+    file.write_text(html_page([frames], Video("child.webm", 0.5)), encoding="utf-8")
+    page = browser.new_page(reduced_motion="reduce")
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(file.as_uri())
+    page.locator("#cycle").fill("50")
+    if there:
+        wanted = 0.5 + 0.5 * GAIT.stride_time
+        page.wait_for_function(
+            "wanted => Math.abs(video.currentTime - wanted) < 0.02", arg=wanted, timeout=GUARD
+        )
+    else:
+        page.wait_for_function("() => !document.getElementById('no-video').hidden", timeout=GUARD)
+    assert page.locator(".now .percent").inner_text().startswith("50 %")
+    page.close()
+    assert not errors

@@ -130,8 +130,8 @@ const gait = (() => {
     }
   }
 
-  const panels = [...document.querySelectorAll(".panel")].map((panel, k) =>
-    new Panel(data.runs[k], panel.querySelector("svg.walker"), panel.querySelector(".now")));
+  const panels = [...document.querySelectorAll("svg.walker")].map((svg, k) =>
+    new Panel(data.runs[k], svg, svg.parentElement.querySelector(".now")));
 
   // The video follows the walkers: it plays on its own, and is set right where it has strayed.
   const video = document.getElementById("video");
