@@ -263,8 +263,8 @@ TABLES: Final[Mapping[str, Sequence[str]]] = {
           for kind in ("peak", "mean")),
         "effort_per_distance", *_SPRINGS,
     ),
-    "report": ("walking_speed", "step_length_*", "cadence", "stride_time", *_TIMES,
-               "effort_per_distance"),
+    "report": ("walking_speed", "step_length_*", "cadence", "stride_time",
+               *(key for key in _TIMES if key != "swing_share_*"), "effort_per_distance"),
     "compare": (
         "walking_speed", "step_length_*", "stride_time", "cadence", "stance_share_*",
         "swing_share_*", "double_support_share", _CROUCH, "peak_vertical_force_*_body_weights",
