@@ -339,6 +339,28 @@ def test_prescribed_springs_are_said_to_be_prescribed(
         )
 
 
+@pytest.mark.usefixtures("no_curves")
+def test_one_spring_may_be_prescribed(made_solution: MadeSolution, tmp_path: Path) -> None:
+    folder = write_made_run(tmp_path / "run", made_solution, "mapd-orthosis")
+    verdict = made_verdict()
+    snapped = verdict.snapped
+    assert snapped is not None
+    names = {k: v for k, v in snapped.names.items() if k != STIFFNESSES[0]}
+    kept = {name: snapped.stiffness[name] for name in names}
+    springs = tuple(
+        replace(s, range=(60.0, 60.0), region=(60.0, 60.0)) if s.name == STIFFNESSES[0] else s
+        for s in verdict.springs
+    )
+    given = replace(verdict, springs=springs, snapped=replace(snapped, names=names, stiffness=kept))
+    metrics = json.loads((folder / "metrics.json").read_text())
+    metrics |= {"verdict": given.as_dict(), "stiffness_ranges": {STIFFNESSES[0]: [60.0, 60.0]}}
+    (folder / "metrics.json").write_text(json.dumps(metrics))
+    (run,) = read_runs([folder])
+    rows = {row.cells[0]: row.cells for row in spring_section(run).tables[0].rows}
+    assert rows["K_D right"][4] == "prescribed by the config, not identified"
+    assert "(K_D) 91.7 N m/rad left;" in gait_page([run]).answer[1]
+
+
 def test_a_verdict_comes_back_from_the_metrics() -> None:
     verdict = made_verdict()
     plain = json.loads(json.dumps(verdict.as_dict()))
@@ -699,7 +721,7 @@ def test_maps_fronts_and_spreads_are_drawn(runs: Path, written_studies: Path) ->
     spread = section(page, "Uncertainty")
     cost = spread.tables[0].rows[0]
     assert cost.cells[0] == "cost"
-    assert cost.cells[3:] == ("11.0000", "2.9000 to 19.1000", "body mass")
+    assert cost.cells[3:] == ("11.0000", "2.0000 to 20.0000", "body mass")
     assert spread.lines[:3] == (
         "20 draws of the uncertain numbers, 19 converged.",
         "K_D right: least effort takes the stiffest (92 N m/rad) in 79 %, one between in 21 % of "

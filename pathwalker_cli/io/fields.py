@@ -69,6 +69,8 @@ class Quantity:
         if isinstance(value, bool) or not isinstance(value, int | float):
             unit = f" in {self.unit}" if self.unit else ""
             mend = f"write the number alone, the unit is always {self.unit}" if self.unit else ""
+            if isinstance(value, dict):
+                mend = "to go on with dots within a name, give the mapping: KEY={name.with.dots: 1}"
             shown = "empty" if value is None else repr(value)
             what = f"is {shown}, which is not a number{unit}"
             raise invalid(what, allowed=self.allowed, mend=mend)

@@ -114,7 +114,7 @@ def _springs(run: ReportRun, several: bool) -> str:
             f"Which springs{named} are fitted makes little difference to this calculation: take "
             "any of the drawer, and choose by fitting."
         )
-    decided = [name for name in STIFFNESSES if name not in undecided]
+    decided = [name for name in free if name not in undecided]
     text = f"Springs to fit{named}: {_values(run, decided)}"
     if undecided:
         kinds = dict.fromkeys(_kind(name) for name in undecided)

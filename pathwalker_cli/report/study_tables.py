@@ -35,7 +35,7 @@ from pathwalker_cli.studies.sensitivity.result import SHOWN, elasticity_text, la
 from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 from pathwalker_cli.studies.uncertainty.figures import spread_figure
-from pathwalker_cli.studies.uncertainty.result import Spread, shown_text
+from pathwalker_cli.studies.uncertainty.result import Spread, shown_text, span_text, span_words
 
 _RANKED: Final = 10
 """Numbers whose sensitivity is shown, the strongest."""
@@ -218,10 +218,9 @@ def _uncertainty(
     summary: UncertaintySummary, values: Mapping[str, np.ndarray], spreads: Sequence[Spread]
 ) -> Section:
     """Return how far springs and gait spread when the patient's numbers are uncertain."""
-    head = ("", "unit", "base", "median", "90 % of draws", "follows most")
-    rows = (_spread_row(each, summary.spreads[each.measure.key].strongest_input)
-            for each in spreads)  # fmt: skip
     count = summary.draws - len(summary.failed)
+    head = ("", "unit", "base", "median", span_words(count), "follows most")
+    rows = (_spread_row(each, values, summary) for each in spreads)
     lines = [f"{summary.draws} draws of the uncertain numbers, {count} converged."]
     lines += [words for each in spreads if (words := _chance(each, summary.ranges))]
     lines += summary.advice
@@ -255,12 +254,15 @@ def _learnt(summary: LearnSummary) -> Section:
     return Section("What the strides say of body and cost", lines, tables=(table,))
 
 
-def _spread_row(spread: Spread, strongest: str | None) -> Row:
-    measure = spread.measure
-    low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
+def _spread_row(
+    spread: Spread, values: Mapping[str, np.ndarray], summary: UncertaintySummary
+) -> Row:
+    measure, key = spread.measure, spread.measure.key
+    strongest = summary.spreads[key].strongest_input
+    span = span_text(spread, values.get(key, np.empty(0)), summary.ranges.get(key))
     return Row((
         measure.label, measure.shown_unit,
-        shown_text(measure, spread.base), middle, f"{low} to {high}",
+        shown_text(measure, spread.base), shown_text(measure, spread.quantiles[1]), span,
         label_of(strongest) if strongest else "-",
     ))  # fmt: skip
 

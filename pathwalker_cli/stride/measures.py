@@ -234,7 +234,7 @@ REGISTRY: tuple[Measure, ...] = (
               lambda s, side: ankle_torque_line(s, side)[0], section=LOADS),
     *per_side("ankle_torque_slope_stance_*", "ankle torque slope over stance, *", "N m/rad",
               "slope of net ankle torque over dorsiflexion, every per cent of stance alike",
-              lambda s, side: ankle_line(s.ankle_profile(side))[0], "mean slope, *",
+              lambda s, side: ankle_line(s.ankle_profile(side))[0], "stance slope, *",
               section=ANKLE, part="stance", kept=False),
     *per_side("peak_net_ankle_torque_*", "peak net ankle torque, *", "N m",
               "largest net plantarflexing ankle torque of stance",
