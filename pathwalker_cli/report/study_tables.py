@@ -75,8 +75,9 @@ def _section(study: Study, run: ReportRun) -> Section:
 def _sensitivity(summary: SensitivitySummary) -> Section:
     """Return what a change of every number does, strongest first, in words and as numbers."""
     measures = measures_in("studies")
+    walking = [m.key for m in measures if m.key not in STIFFNESSES]  # springs may be open
     sizes = {
-        place: max((abs(values.get(m.key) or 0.0) for m in measures), default=0.0)
+        place: max((abs(values.get(key) or 0.0) for key in walking), default=0.0)
         for place, values in summary.elasticities.items()
     }
     ranked = [p for p in sorted(sizes, key=sizes.__getitem__, reverse=True) if sizes[p] >= SHOWN]
