@@ -687,9 +687,7 @@ def test_studies_beside_a_run_add_their_tables(runs: Path) -> None:
     assert "no solution" in rows[1].cells
     (row,) = section(page, "Sensitivity").tables[0].rows
     assert row.cells == ("body mass", "1.500")
-    assert section(page, "Sensitivity").points == (
-        "10 % more of body mass would change cost by +15.0 %",
-    )
+    assert section(page, "Sensitivity").points == ("Body mass: 10 % more changes cost by +15.0 %",)
     hinges = " ".join(section(page, "What the answer hangs on").points)
     assert "that it follows most: body mass (1.5 % of the cost per %)" in hinges
     assert HOSTILE in words_of(page)

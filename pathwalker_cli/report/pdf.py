@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
@@ -16,6 +17,8 @@ from matplotlib.font_manager import get_font
 from pathwalker_cli import __version__
 from pathwalker_cli.report.content import Drawing, Fact, Page, Section, Shape, Table, tight
 from pathwalker_cli.stride.figures.inline import outlined_svg
+
+logging.getLogger("fpdf.svg").setLevel(logging.ERROR)  # it knows no hatches; outlines stay
 
 _MARGINS: Final = (11.0, 8.0)
 """Margins left and right, above and below [mm]."""

@@ -104,9 +104,12 @@ def _sensitivity(summary: SensitivitySummary) -> Section:
 def _in_words(place: str, values: Mapping[str, float | None], measures: Sequence[Measure]) -> str:
     """Return in a sentence what ten per cent more of a number do, the two strongest first."""
     known = {m.label: values.get(m.key) or 0.0 for m in measures if m.key not in STIFFNESSES}
+    if any(map(_moves, (size for label, size in known.items() if label != "cost"))):
+        known.pop("cost", None)
     most = sorted(known, key=lambda label: abs(known[label]), reverse=True)[:2]
     moved = " and ".join(f"{label} by {10.0 * known[label]:+.1f} %" for label in most)
-    return f"10 % more of {label_of(place)} would change {moved}"
+    name = label_of(place)
+    return f"{name[:1].upper()}{name[1:]}: 10 % more changes {moved}"
 
 
 def _moves(value: float | None) -> bool:
