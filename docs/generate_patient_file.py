@@ -41,6 +41,9 @@ _ABOUT: Final = {
     "contact_points": "Heel and toe of the rigid foot, `[forward, up]` of the ankle joint [m], with the foot at "
     "90 degrees to the shank. One pair counts for both feet; `{right: {heel: ..., toe: ...}, left: ...}` tells them "
     "apart.",
+    "rocker_radius": "Radii of the circles on which heel and ball of the foot roll, barefoot and shod, and of the ends of "
+    "a sole. They count in problems with `model.feet` rockers or sole; what is left out is a share of the length of the "
+    "foot.",
     "strengths": "Maximum isometric torques. Needed for predictions, not for recorded gait; `pathwalker id` "
     "estimates them from recordings. Given, the block must be complete.",
     "examination": "Passive range of motion from the couch, in degrees. Counts in problems with `model.tissue: true`; "
@@ -84,6 +87,10 @@ MEANINGS: Final = {
     "contact_points.barefoot.toe": "",
     "contact_points.orthosis.heel": "sole of the shoe that is worn with the orthosis; needed with one",
     "contact_points.orthosis.toe": "",
+    "rocker_radius.heel": "left out: 0.18 of the foot's length",
+    "rocker_radius.toe": "left out: 0.18 of the foot's length",
+    "sole_roundness": "radius of a sole where it lies flat, in distances from heel to toe, for `model.feet: sole`; "
+    "left out: 1.5",
     "strengths.hip_extension": "",
     "strengths.hip_flexion": "",
     "strengths.knee_extension": "",
@@ -97,6 +104,8 @@ MEANINGS: Final = {
     "examination.knee_extension": "negative where the knee does not straighten; typical 0",
     "examination.dorsiflexion_knee_extended": "with the knee straight; typical 13",
     "examination.dorsiflexion_knee_flexed": "with the knee at 90; typical 32",
+    "orthosis.cuff_height": "middle of the cuff above the hinge, for its force on the leg; left out: 0.7 of the shank",
+    "orthosis.cuff_area": "area on which the cuff presses, in front or behind; left out: 0.06 of the squared shank",
     "orthosis.mass.shank": "what orthosis and shoe add to each shank",
     "orthosis.mass.foot": "the same of each foot",
     "orthosis.neutral_angle": "ankle angle at which the springs give no torque",

@@ -16,6 +16,7 @@ from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.variation import varied
 
 if TYPE_CHECKING:
+    from pathwalker_cli.model.parts import Parts
     from pathwalker_cli.model.walker import Walker
 
 
@@ -59,6 +60,14 @@ class Case:
         """
         return varied(self.unvaried, self.config.variation, self.config.numbers)
 
+    @property
+    def parts(self) -> Parts:
+        """What the walker is made of."""
+        from pathwalker_cli.model.parts import Parts  # takes long: only who needs it
+
+        model = self.config.model
+        return Parts(self.config.condition, model.tissue, model.feet, model.uses)
+
     def walker(self, backend: str = "auto") -> Walker:
         """Return the walking model of the patient in the condition of the problem.
 
@@ -69,13 +78,10 @@ class Case:
             PatientError: If the patient lacks strengths or an orthosis that is worn.
             ConfigError: If a number is to be free that does not exist.
         """
-        from pathwalker_cli.model.walker import build_walker  # takes long: only who needs it
+        from pathwalker_cli.model.walker import walker_of  # takes long: only who needs it
 
-        config, model = self.config, self.config.model
-        free = tuple(config.free)
-        return build_walker(
-            self.patient, config.condition, model.published, backend, free, model.tissue
-        )
+        free = tuple(self.config.free)
+        return walker_of(self.patient, self.parts, self.config.model.published, backend, free)
 
     def with_values(self, values: Mapping[str, Any], where: str = "") -> Case:
         """Return the case with other values in its config; see `config.with_values`.

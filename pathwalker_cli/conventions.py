@@ -9,7 +9,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from pathwalker_cli.model.contact import FORCES, POINTS
+from pathwalker_cli.model.contact import POINTS, contact_pattern
 from pathwalker_cli.model.skeleton import PLANAR_WALKER
 from pathwalker_cli.model.skeleton import SIDES as SIDES
 from pathwalker_cli.model.skeleton import SUFFIX as SUFFIX
@@ -53,8 +53,8 @@ STIFFNESSES: Final = tuple(
 """Free orthosis parameters in order: K_D right, left, K_P right, left [N m/rad]."""
 
 CONTACT_POINTS: Final = tuple(point.name for point in POINTS)
-CONTACT_FORCES: Final = tuple(force.name for force in FORCES)
-"""Components of the ground reaction forces (on the body) in order [N]."""
+CONTACT_FORCES: Final = contact_pattern().force_names
+"""Components of the ground reaction forces (on the body) in order [N], of heels and toes."""
 
 CONDITIONS: Final = ("barefoot", "orthosis")
 Condition = Literal["barefoot", "orthosis"]

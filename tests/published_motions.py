@@ -17,7 +17,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, SIDES, Condition
-from pathwalker_cli.model.contact import PHASE_NAMES
+from pathwalker_cli.model.contact import contact_pattern
 from pathwalker_cli.model.elements.muscle import generators
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
@@ -99,8 +99,8 @@ def sparse_gait(problem: str) -> Stride:
         problem=problem,
         walker=published_walker("orthosis" if "orthosis" in problem else "barefoot"),
         time=np.array([*times, durations.sum()]),
-        phase=(*phases, PHASE_NAMES[-1]),
-        stances=phase_stances(durations),
+        phase=(*phases, contact_pattern().names[-1]),
+        stances=phase_stances(contact_pattern(), durations),
         q=np.vstack([*poses, end]),
     )
 
@@ -119,8 +119,8 @@ def published_gait(problem: str) -> Stride:
         problem=problem,
         walker=published_walker("orthosis" if "orthosis" in problem else "barefoot"),
         time=time,
-        phase=tuple(np.repeat(PHASE_NAMES, counts)),
-        stances=phase_stances(np.diff(switching)),
+        phase=tuple(np.repeat(contact_pattern().names, counts)),
+        stances=phase_stances(contact_pattern(), np.diff(switching)),
         q=q,
         **known,
     )

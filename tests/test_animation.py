@@ -32,7 +32,7 @@ from pathwalker_cli.animation.viewer import poses, walker_geometry
 from pathwalker_cli.cli import cli
 from pathwalker_cli.conventions import GENERATORS, SIDES, SUFFIX
 from pathwalker_cli.gait.solution import GaitSolution
-from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
+from pathwalker_cli.model.contact import PHASES, phase_named
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
 
@@ -98,8 +98,9 @@ def test_the_cycle_begins_where_and_when_the_right_heel_strikes(frames: GaitFram
     assert frames.phase[-1] == "left_toe"
     assert frames.points["heel_r"][0, 0] == 0.0
     first = [name for i, name in enumerate(frames.phase) if i == 0 or frames.phase[i - 1] != name]
-    start = PHASE_NAMES.index("left_toe_right_heel")
-    assert first == [*PHASE_NAMES[start:], *PHASE_NAMES[:start]]
+    names = [phase.name for phase in PHASES]
+    start = names.index("left_toe_right_heel")
+    assert first == [*names[start:], *names[:start]]
 
 
 def test_the_next_stride_follows_without_a_jump(frames: GaitFrames) -> None:
@@ -116,7 +117,7 @@ def test_instants_are_those_of_any_other_number_of_instants(frames: GaitFrames) 
 
 
 def test_standing_points_stay_on_the_ground_and_where_they_are(frames: GaitFrames) -> None:
-    for name in PHASE_NAMES:
+    for name in (phase.name for phase in PHASES):
         rows = np.flatnonzero(np.array(frames.phase) == name)
         for point in phase_named(name).points:
             x, z = frames.points[point.name][rows].T

@@ -187,7 +187,7 @@ def test_another_topology_is_refused() -> None:
 
 def test_an_unknown_parameter_is_named() -> None:
     with pytest.raises(BackendError, match=r"no parameter wing\.mass"):
-        parameters_of(walker(0), CONTACT_POINTS, ("wing.mass",))
+        parameters_of(walker(0), Topology.of(walker(0), CONTACT_POINTS), ("wing.mass",))
 
 
 def test_the_report_names_every_back_end() -> None:

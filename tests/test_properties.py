@@ -57,7 +57,7 @@ from pathwalker_cli.io.opensim import read_opensim, write_opensim
 from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.model.anthropometry import segments
-from pathwalker_cli.model.contact import PHASE_NAMES, PHASES
+from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.elements.curves import BezierChain, evaluate
 from pathwalker_cli.model.elements.muscle import (
     ACTIVATION_TIME,
@@ -161,11 +161,11 @@ def across(place: tuple[str, str]) -> tuple[str, str]:
     """Return name and place of the same row of the other step."""
     name, where = place
     subject, *rest = name.split(" ")
-    if " excitation " in name and where.startswith(f"{PHASE_NAMES[-1]} at 100 %"):
-        where = f"{PHASE_NAMES[0]} at 0 % of the phase"  # nodes are named where a phase begins
-    for i, phase in enumerate(PHASE_NAMES):
+    if " excitation " in name and where.startswith(f"{PHASES[-1].name} at 100 %"):
+        where = f"{PHASES[0].name} at 0 % of the phase"  # nodes are named where a phase begins
+    for i, phase in enumerate(phase.name for phase in PHASES):
         if where.startswith(f"{phase} at"):
-            opposite = PHASE_NAMES[(i + len(PHASES) // 2) % len(PHASES)]
+            opposite = PHASES[(i + len(PHASES) // 2) % len(PHASES)].name
             where = where.replace(phase, opposite, 1)
             break
     return " ".join([mirrored(subject), *rest]), where
@@ -678,7 +678,9 @@ def test_discomfort_is_smooth_and_grows_outside_the_range(
         q[COORDINATES.index("knee_r")] = angle
         zeros = [0.0] * len(GENERATORS)
         point = Instant(PHASES[0], q, q, zeros, zeros)
-        return goals.integrands(point, goals.numbers(300.0), goals.goals)[0]
+        return goals.integrands(
+            point, goals.numbers(stylised_series("barefoot").walker), goals.goals
+        )[0]
 
     angle = ca.SX.sym("angle")
     hessian, gradient = ca.hessian(cost(angle), angle)

@@ -12,7 +12,6 @@ import numpy as np
 
 from pathwalker_cli.conventions import SIDES, Condition, Side
 from pathwalker_cli.evaluation.run import run_names, run_notes, stride_of_run
-from pathwalker_cli.model.contact import PHASE_NAMES
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import (
     body_points,
@@ -178,8 +177,9 @@ def _points(series: GaitSeries, time: np.ndarray) -> dict[str, np.ndarray]:
 
 def _phases(series: GaitSeries, time: np.ndarray) -> tuple[str, ...]:
     """Return the phase at some instants; a phase begins with its first one."""
-    rows = np.searchsorted(switching_times(series.motion), time, side="right") - 1
-    return tuple(PHASE_NAMES[min(row, len(PHASE_NAMES) - 1)] for row in rows)
+    pattern = series.walker.pattern
+    rows = np.searchsorted(switching_times(pattern, series.motion), time, side="right") - 1
+    return tuple(pattern.names[min(row, len(pattern.names) - 1)] for row in rows)
 
 
 def _open_stride(series: GaitSeries) -> tuple[str, ...]:

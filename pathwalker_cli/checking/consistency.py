@@ -185,7 +185,7 @@ def _flat_feet(solver: GaitSolver) -> Iterator[ConfigError]:
 
 def _pitch(solver: GaitSolver, q: np.ndarray, side: str) -> float:
     """Return the pitch of a sole [rad]: 0 if it lies flat, + if the toe is lower."""
-    points = solver.walker.contact_points(q)
+    points = solver.walker.foot_points(q)
     first = 2 * ("right", "left").index(side)
     forward, up = points[first + 1] - points[first]
     return -math.atan2(up, forward)

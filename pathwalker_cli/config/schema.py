@@ -11,8 +11,15 @@ from pathwalker_cli.config.learnt import Learnt
 from pathwalker_cli.conventions import ANGLES, STIFFNESSES, Condition
 from pathwalker_cli.errors import did_you_mean
 from pathwalker_cli.gait.costs import GOALS, Costs
-from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
-from pathwalker_cli.model.contact import PHASE_NAMES
+from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
+from pathwalker_cli.model.contact import (
+    PHASE_NAMES,
+    Contact,
+    ContactPattern,
+    Feet,
+    Use,
+    contact_pattern,
+)
 from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.patient.variation import Variation
 from pathwalker_cli.problems import PROBLEMS
@@ -79,6 +86,27 @@ class ModelConfig(YamlModel):
     backend: Literal["auto", "pinocchio.casadi", "compiled", "direct"] = "auto"
     published: bool = False
     tissue: bool = False
+    feet: Feet = "points"
+    contact: Sides[Use] = Sides[Use](right="heel_toe", left="heel_toe")
+
+    @property
+    def uses(self) -> Contact:
+        """Use of the right and the left foot."""
+        return self.contact.right, self.contact.left
+
+    @property
+    def pattern(self) -> ContactPattern:
+        """The phases of a stride."""
+        return contact_pattern(self.feet, self.uses)
+
+    @model_validator(mode="after")
+    def _rolling(self) -> ModelConfig:
+        if self.feet == "sole" and set(self.uses) != {"heel_toe"}:
+            raise invalid(
+                "gives model.contact for feet with soles, which roll over whatever they land on",
+                mend="leave contact out, or set feet to rockers",
+            )
+        return self
 
 
 class CostConfig(YamlModel):
@@ -165,16 +193,6 @@ class MeshConfig(YamlModel):
     velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2
     refinements: Annotated[int, Field(ge=0, le=20)] = 12
 
-    @field_validator("intervals")
-    @classmethod
-    def _one_per_phase(cls, value: int | tuple[int, ...]) -> int | tuple[int, ...]:
-        if isinstance(value, tuple) and len(value) != len(PHASE_NAMES):
-            raise invalid(
-                f"has {len(value)} entries",
-                allowed=f"one number, or one per phase: {len(PHASE_NAMES)}",
-            )
-        return value
-
 
 class StartConfig(YamlModel):
     """Where the search begins."""
@@ -240,6 +258,26 @@ class StudyConfig(YamlModel):
             allowed = ", ".join(PROBLEMS)
             raise invalid(f"is '{value}'", allowed=allowed, mend=did_you_mean(value, PROBLEMS))
         return value
+
+    @model_validator(mode="after")
+    def _one_per_phase(self) -> StudyConfig:
+        given, names = self.mesh.intervals, self.model.pattern.names
+        if isinstance(given, tuple) and len(given) != len(names):
+            raise invalid(
+                f"has {len(given)} entries in mesh.intervals",
+                allowed=f"one number, or one per phase: {len(names)} ({', '.join(names)})",
+            )
+        if strangers := sorted(self.bounds.phase_durations.keys() - set(names)):
+            raise invalid(
+                f"bounds the phase {strangers[0]}, which these feet do not have",
+                allowed=", ".join(names),
+            )
+        if self.model.feet == "sole" and self.cost.goals.get("centre_of_pressure"):
+            raise invalid(
+                "weighs the goal 'centre_of_pressure', which needs heel and toe: a sole rolls",
+                mend="leave the goal out, or set model.feet to points or rockers",
+            )
+        return self
 
     @model_validator(mode="after")
     def _start(self) -> StudyConfig:

@@ -9,7 +9,6 @@ from pathwalker_cli.config.schema import StudyConfig, merged
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.refusals import KeyPath
 from pathwalker_cli.io.yaml_file import read_value, validate
-from pathwalker_cli.model.contact import PHASE_NAMES
 
 NO_VALUE: Final = "-"
 """Stands for the value of a key that a config does not have, such as one of a mapping."""
@@ -69,7 +68,8 @@ def nested(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def smoke_version(config: StudyConfig) -> StudyConfig:
     """Return a config with a short horizon for quick checks: coarse mesh, no refinement."""
-    mesh = config.mesh.model_copy(update={"intervals": (2,) * len(PHASE_NAMES), "refinements": 0})
+    coarse = (2,) * len(config.model.pattern.phases)
+    mesh = config.mesh.model_copy(update={"intervals": coarse, "refinements": 0})
     loose = {"max_iterations": min(400, config.solver.max_iterations), "tolerance": 1e-3}
     solver = config.solver.model_copy(update=loose)
     changes = {"mesh": mesh, "solver": solver, "smoke": True, "verdict": False}

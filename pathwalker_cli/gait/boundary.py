@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -10,6 +10,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import mirror_permutation
 from pathwalker_cli.gait.costs import Costs, Totals
+from pathwalker_cli.model.contact import ContactPhase
 from pathwalker_cli.ocp.problem import INFINITY, Boundary, Instant, Rows, Variables
 
 Groups = tuple[Variables, Variables, Variables]
@@ -20,7 +21,7 @@ def gait_boundary(
     parameters: Variables,
     costs: Costs,
     weights: Mapping[str, ca.SX],
-    phases: int,
+    phases: Sequence[ContactPhase],
     mirrored: bool,
     start: Rows | None = None,
 ) -> Boundary:
@@ -31,13 +32,13 @@ def gait_boundary(
         parameters: Free parameters; of a mirrored gait left and right are equal.
         costs: The cost terms.
         weights: Weight of every one by name.
-        phases: Number of phases.
+        phases: The phases.
         mirrored: Whether the phases are one step and the other is its mirror image.
         start: Rows in the first instant's states (the symbol of `groups[0]`) of a passage that
             is not periodic; None for a periodic gait.
     """
     first, last = _instant(groups, "first"), _instant(groups, "last")
-    durations = ca.SX.sym("durations", phases)
+    durations = ca.SX.sym("durations", len(phases))
     totals = ca.SX.sym("integrals", len(costs.integrals))
     steps = 2 if mirrored else 1  # distance, time and costs are those of a whole stride
     x = groups[0].names.index("pelvis_tx")
@@ -51,7 +52,8 @@ def gait_boundary(
         ends = [_at_first(start, groups[0], first[0])]
     rows = Rows.join(*ends, *([_symmetry(parameters)] if mirrored else []), free)
     total = dict(zip(costs.integrals, ca.vertsplit(steps * totals), strict=True))
-    objective = costs.objective(weights, Totals(total, distance, time, ca.vertsplit(durations)))
+    totals_by_name = Totals(total, distance, time, ca.vertsplit(durations), phases)
+    objective = costs.objective(weights, totals_by_name)
     return Boundary(first, last, durations, totals, rows, objective)
 
 

@@ -14,7 +14,7 @@ from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.problem import ACTIVATIONS, RESERVES, VELOCITIES
 from pathwalker_cli.io.fields import quantity_at
-from pathwalker_cli.model.contact import FORCES, PHASES, POINTS
+from pathwalker_cli.model.contact import ContactPattern
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.problem import INFINITY, BoundTable
@@ -67,14 +67,15 @@ def gait_bounds(
     entries |= _each(ACTIVATIONS, (0.0, 1.0))
     entries |= _joint_ranges(walker, config, sources)
     entries |= _each(VELOCITIES, (-config.joint_speed, config.joint_speed))
-    for phase in PHASES:
+    pattern = walker.pattern
+    for phase in pattern.phases:
         pair = config.phase_durations.get(phase.name, config.phase_duration)
         entries[("duration", phase.name)] = pair
         sources[f"duration of {phase.name}"] = f"[{pair[0]:g}, {pair[1]:g}] s, from the config"
-    loads = (force.name for force in FORCES if force.bears)
+    loads = (force.name for force in pattern.forces if force.bears)
     entries |= _each(loads, (config.least_vertical_force, INFINITY))
-    entries |= _each((f"{p.name} height" for p in POINTS), (config.least_height, INFINITY))
-    entries |= _lift_off()
+    entries |= _each((f"{p.name} height" for p in pattern.points), (config.least_height, INFINITY))
+    entries |= _lift_off(pattern)
     entries[("distance",)] = config.distance
     entries[("walking_speed",)] = (_least_speed(walker, config, sources), INFINITY)
     ranges, keys = _unknowns(walker, config, free, sources)
@@ -83,22 +84,22 @@ def gait_bounds(
     return GaitBounds(BoundTable(entries), sources, ranges, keys)
 
 
-def recorded_durations(bounds: GaitBounds, durations: np.ndarray) -> GaitBounds:
-    """Return bounds that fix the phases to their recorded durations [s], shape (8,)."""
-    pairs = list(zip(PHASES, durations.tolist(), strict=True))
-    table = bounds.table.replace({("duration", phase.name): (d, d) for phase, d in pairs})
-    sources = {f"duration of {phase.name}": f"{d:.4g} s, as recorded" for phase, d in pairs}
+def recorded_durations(bounds: GaitBounds, durations: Mapping[str, float]) -> GaitBounds:
+    """Return bounds that fix the phases to their recorded durations by name [s]."""
+    pairs = durations.items()
+    table = bounds.table.replace({("duration", phase): (d, d) for phase, d in pairs})
+    sources = {f"duration of {phase}": f"{d:.4g} s, as recorded" for phase, d in pairs}
     return replace(bounds, table=table, sources={**bounds.sources, **sources})
 
 
 def tracking_bounds(
-    bounds: GaitBounds, durations: np.ndarray, held: Mapping[str, float]
+    bounds: GaitBounds, durations: Mapping[str, float], held: Mapping[str, float]
 ) -> BoundTable:
     """Return the bounds of the first stage: given durations and parameters, free reserves.
 
     Args:
         bounds: Bounds of the prediction.
-        durations: Phase durations [s], shape (8,).
+        durations: Phase durations by name [s].
         held: Value of every unknown of the walker by name [SI].
     """
     changes = _each((*RESERVES, "walking_speed"), ANYTHING)
@@ -141,12 +142,11 @@ def _each(names: Iterable[str], pair: Range) -> Entries:
     return {(name,): pair for name in names}
 
 
-def _lift_off() -> Entries:
-    """Return zero force at the last instant before a point leaves the ground."""
-    following = PHASES[1:] + PHASES[:1]
+def _lift_off(pattern: ContactPattern) -> Entries:
+    """Return zero force at the last instant before a place leaves the ground."""
     return {
         (force.name, phase.name, "end"): (0.0, 0.0)
-        for phase, after in zip(PHASES, following, strict=True)
+        for phase, after in zip(pattern.phases, pattern.following, strict=True)
         for force in phase.lifted_off(after)
     }
 

@@ -19,6 +19,8 @@ PEAK_POWER: Final = 8
 """Power of the mean that stands for the largest activation."""
 PEAK_FLOOR: Final = 1e-6
 """Keeps the derivative of the root finite where no muscle is active: a peak of 0.18."""
+NEAR_GROUND: Final = 0.015
+"""Height over which the ground matters to a foot that swings [m]: people clear it by 1 to 2 cm."""
 COMFORT_ROUNDING: Final = 0.01
 """Half width to which the edge of a comfortable range is rounded off [rad]."""
 NO_EDGE: Final = 10.0

@@ -11,6 +11,7 @@ from pathwalker_cli.conventions import COORDINATES
 from pathwalker_cli.gait.costs import BASE, GOALS, Costs, Instant, Totals, Weights
 from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.model.elements.muscle import excitation_from_rate
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 from pathwalker_cli.ocp.problem import Sample
 
@@ -46,32 +47,29 @@ def prediction_terms(
 
 
 def goal_values(
-    motion: PhasedMotion, weight: float, comfort_ranges: Mapping[str, tuple[float, float]]
+    motion: PhasedMotion, walker: Walker, comfort_ranges: Mapping[str, tuple[float, float]]
 ) -> dict[str, float]:
     """Return the value of every goal, without weights; of discomfort only if ranges are given.
 
     Args:
         motion: A whole stride.
-        weight: Body weight, orthosis included [N].
+        walker: Who walks.
         comfort_ranges: Comfortable range by coordinate [rad].
     """
     names = tuple(name for name in GOALS if name != "discomfort" or comfort_ranges)
     costs = Costs(names, comfort_ranges=comfort_ranges)
-    gains = sum(_goal_gains(phase, costs, weight).sum(axis=0) for phase in motion.phases)
+    gains = sum(_goal_gains(phase, costs, walker).sum(axis=0) for phase in motion.phases)
     integrals = [i for term in costs.goals.values() for i in term.integrals]
     totals = _totals(motion, dict(zip(integrals, np.asarray(gains), strict=True)))
     return {name: float(value) for name, value in costs.goal_values(totals).items()}
 
 
-def with_goal_costs(motion: PhasedMotion, costs: Costs, weight: float) -> PhasedMotion:
-    """Return a motion, of a problem with any goals, whose integrals are those of these goals.
-
-    `weight` is that of the body, orthosis included [N].
-    """
+def with_goal_costs(motion: PhasedMotion, costs: Costs, walker: Walker) -> PhasedMotion:
+    """Return a motion, of a problem with any goals, whose integrals are those of these goals."""
     base = sum(len(term.integrals) for term in BASE.values())
     phases, reached = [], np.zeros(len(costs.integrals) - base)
     for phase in motion.phases:
-        gains = np.vstack([reached, _goal_gains(phase, costs, weight)]).cumsum(axis=0)
+        gains = np.vstack([reached, _goal_gains(phase, costs, walker)]).cumsum(axis=0)
         reached = gains[-1]
         phases.append(replace(phase, integrals=np.hstack([phase.integrals[:, :base], gains])))
     return replace(motion, phases=tuple(phases))
@@ -92,10 +90,11 @@ def _squared_distance(motion: PhasedMotion, samples: tuple[Sample, ...]) -> floa
 
 def _totals(motion: PhasedMotion, integrals: Mapping[str, float]) -> Totals:
     durations = [phase.duration for phase in motion.phases]
-    return Totals(integrals, walked_distance(motion), motion.duration, durations)
+    phases = [phase_named(phase.name) for phase in motion.phases]
+    return Totals(integrals, walked_distance(motion), motion.duration, durations, phases)
 
 
-def _goal_gains(phase: PhaseMotion, costs: Costs, weight: float) -> np.ndarray:
+def _goal_gains(phase: PhaseMotion, costs: Costs, walker: Walker) -> np.ndarray:
     """Return the integrals of the goals' running costs over every interval, shape (N, k)."""
     contact, n = phase_named(phase.name), len(COORDINATES)
     shape = phase.inner_states.shape[:2]
@@ -106,9 +105,15 @@ def _goal_gains(phase: PhaseMotion, costs: Costs, weight: float) -> np.ndarray:
     q, v = np.split(phase.inner_states, 2, axis=-1)
     vdot, force, reserve = np.split(phase.algebraic, [n, n + len(contact.forces)], axis=-1)
     excitation = excitation_from_rate(rate, activation)
-    columns = q, v, activation, force, rate, excitation, vdot, reserve
+    air = walker.pattern.in_the_air(contact)
+    places = walker.contact_motion(q.reshape(-1, n).T, v.reshape(-1, n).T)
+    position, velocity = (np.asarray(values).T.reshape(*shape, -1) for values in places)
+    heights, speeds = position[..., 1::2][..., air], velocity[..., ::2][..., air]
+    elements = walker.element_forces(*(x.reshape(-1, x.shape[-1]) for x in (q, v, activation)))
+    worn = elements[:, walker.columns(walker.device.forces)].reshape(*shape, -1)
+    columns = q, v, activation, force, rate, excitation, vdot, reserve, q, heights, speeds, worn
     point = Instant(contact, *(list(np.moveaxis(values, -1, 0)) for values in columns))
-    running = costs.integrands(point, list(costs.numbers(weight)), costs.goals)
+    running = costs.integrands(point, list(costs.numbers(walker)), costs.goals)
     values = np.array([np.broadcast_to(cost, shape) for cost in running])
     steps, weights = phase.duration * np.diff(phase.mesh), quadrature_weights(phase.degree)[1]
     return np.asarray(np.einsum("kij,i,j->ik", values.reshape(-1, *shape), steps, weights))

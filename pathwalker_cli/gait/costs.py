@@ -9,13 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, LEG_JOINTS, SUFFIX
 from pathwalker_cli.gait import choices
-from pathwalker_cli.model.contact import PHASES, ContactPhase
+from pathwalker_cli.model.contact import ContactPhase
+from pathwalker_cli.model.skeleton import SIDES
+
+if TYPE_CHECKING:
+    from pathwalker_cli.model.walker import Walker
 
 Weights = Mapping[str, float]
 """Weight of every term by its name; what is missing counts nothing."""
@@ -36,6 +40,9 @@ class Instant:
         vdot: Generalised accelerations, 10 entries [m/s^2, rad/s^2].
         reserve: Reserve forces, 10 entries [N, N m].
         reference: Coordinates that are followed, 10 entries [m, rad].
+        heights: Heights of the places in the air, in the order of the walker's pattern [m].
+        speeds: Their forward velocities [m/s].
+        worn: Torques of the orthoses right, left [N m]; none barefoot.
         power: Power of the activations in the effort.
         data: Numbers of the term, see `CostTerm.size`.
     """
@@ -50,6 +57,9 @@ class Instant:
     vdot: Sequence[Any] = ()
     reserve: Sequence[Any] = ()
     reference: Sequence[Any] = ()
+    heights: Sequence[Any] = ()
+    speeds: Sequence[Any] = ()
+    worn: Sequence[Any] = ()
     power: int = field(default=2, kw_only=True)
     data: Sequence[Any] = ()
 
@@ -61,7 +71,7 @@ class Instant:
     @property
     def first_step(self) -> bool:
         """Whether the phase belongs to the first half of the stride."""
-        return PHASES.index(self.phase) < len(PHASES) // 2
+        return self.phase.step == SIDES[0]
 
     @property
     def vertical_force(self) -> dict[str, Any]:
@@ -82,13 +92,15 @@ class Totals:
         integrals: Integrals of the running costs by name.
         distance: Distance of the stride [m].
         time: Time of the stride [s].
-        durations: Durations of the eight phases, or of four of half a cycle [s].
+        durations: Durations of the phases, of half a cycle those of one step [s].
+        phases: The phases.
     """
 
     integrals: Mapping[str, Any]
     distance: Any
     time: Any
     durations: Sequence[Any]
+    phases: Sequence[ContactPhase]
 
 
 @dataclass(frozen=True)
@@ -200,12 +212,23 @@ def _asymmetry(point: Instant) -> tuple[Any, ...]:
 
 def _asymmetry_value(total: Totals) -> Any:
     advance, *differences = (total.integrals[name] for name in GOALS["asymmetry"].integrals)
-    half = len(PHASES) // 2
-    pairs = [(total.durations[i], total.durations[i + half]) for i in range(half)]
     squares = [(2.0 * advance - total.distance) / total.distance]
-    squares += [(first - second) / total.time for first, second in pairs]
+    squares += [(first - second) / total.time for first, second in _pairs(total)]
     squares += [difference / total.time for difference in differences]
     return sum(square**2 for square in squares)
+
+
+def _pairs(total: Totals) -> list[tuple[Any, Any]]:
+    """Return the times of phases right and left; of unlike steps those of their supports."""
+    timed = list(zip(total.phases, total.durations, strict=True))
+    right, left = ([each for each in timed if each[0].step == side] for side in SIDES)
+    if len(right) == len(left):
+        return [(a, b) for (_, a), (_, b) in zip(right, left, strict=True)]
+
+    def supported(step: list[tuple[ContactPhase, Any]], feet: int) -> Any:
+        return sum(time for phase, time in step if len(phase.feet) == feet)
+
+    return [(supported(right, feet), supported(left, feet)) for feet in (1, 2)]
 
 
 def _pressure(point: Instant) -> tuple[Any, ...]:
@@ -250,6 +273,18 @@ def _foot_pitch(point: Instant) -> tuple[Any, ...]:
     return (sum((sum(map(point.angle, names)) ** 2 for names in chain), 0.0 * point.q[0]),)
 
 
+def _stumbling(point: Instant) -> tuple[Any, ...]:
+    pairs = zip(point.heights, point.speeds, strict=True)
+    near = (speed**2 / (1.0 + (h / choices.NEAR_GROUND) ** 2) ** 2 for h, speed in pairs)
+    return (sum(near, 0.0 * point.q[0]),)
+
+
+def _cuff_load(point: Instant) -> tuple[Any, ...]:
+    weight, *heights = point.data
+    forces = (torque / (h * weight) for torque, h in zip(point.worn, heights, strict=False))
+    return (sum((force**2 for force in forces), 0.0 * point.q[0]),)
+
+
 def _mean(name: str) -> Callable[[Totals], Any]:
     """Return the mean over the stride of one running cost as a value."""
     return lambda total: total.integrals[name] / total.time
@@ -274,6 +309,16 @@ GOALS: Final[dict[str, CostTerm]] = {
     "level_foot": CostTerm(
         "carry the foot level: squared pitch of feet in the air, per distance",
         ("foot_pitch",), _foot_pitch, _of("foot_pitch"), "rad^2 s/m", per_distance=True,
+    ),
+    "clear_ground": CostTerm(
+        "swing the feet clear of the ground: squared forward speed of places in the air, a quarter "
+        "of it at 1.5 cm of height and hardly any above 4, per distance",
+        ("stumbling",), _stumbling, _of("stumbling"), "m/s", per_distance=True,
+    ),
+    "cuff_load": CostTerm(
+        "spare the leg under the cuff: squared forces of the orthoses' cuffs in body weights, per "
+        "distance",
+        ("cuff_load",), _cuff_load, _of("cuff_load"), "s/m", size=3, per_distance=True,
     ),
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",
@@ -350,13 +395,14 @@ class Costs:
         """How many numbers the terms take."""
         return sum(term.size for term in self.terms.values())
 
-    def numbers(self, weight: float) -> np.ndarray:
-        """Return the numbers of all terms for a body weight, orthosis included [N], (size,)."""
+    def numbers(self, walker: Walker) -> np.ndarray:
+        """Return the numbers of all terms for a walker, shape (size,)."""
         wide = (-choices.NO_EDGE, choices.NO_EDGE)
         ranges = [self.comfort_ranges.get(name, wide) for name in ANGLES]
         known = {
             "upright_trunk": [self.trunk_lean],
-            "centre_of_pressure": [weight],
+            "centre_of_pressure": [walker.weight],
+            "cuff_load": [walker.weight, *(walker.patient.cuff_height(side) for side in SIDES)],
             "discomfort": np.array(ranges).T.ravel(),
         }
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])

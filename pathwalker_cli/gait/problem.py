@@ -23,7 +23,7 @@ from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.boundary import gait_boundary
 from pathwalker_cli.gait.costs import Costs, Instant, Weights
-from pathwalker_cli.model.contact import FORCES, PHASES, ContactForce, ContactPhase
+from pathwalker_cli.model.contact import ContactForce, ContactPhase
 from pathwalker_cli.model.elements import element_forces, generalised_forces
 from pathwalker_cli.model.elements.muscle import (
     ACTIVATION_TIME,
@@ -84,7 +84,7 @@ class _Constants:
                 numbers,
                 [friction],
                 [weights.get(name, 0.0) for name in costs.weighed],
-                costs.numbers(walker.weight),
+                costs.numbers(walker),
                 *map(walker.body_slopes, self.moving),
             ]
         )
@@ -123,7 +123,8 @@ class GaitProblem:
         self.walker = walker
         self.form = form
         self.costs = replace(costs or Costs(), passage=form == "passage")
-        self.phases = PHASES[: len(PHASES) // 2] if form == "step" else PHASES
+        self.pattern = walker.pattern
+        self.phases = self.pattern.steps[0] if form == "step" else self.pattern.phases
         self.constants = _Constants(walker, self.costs)
         scale = np.repeat([1.0, choices.VELOCITY_SIZE], len(COORDINATES))
         self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
@@ -140,12 +141,13 @@ class GaitProblem:
         """What the expressions depend on; problems of equal structure differ in numbers only."""
         body = self.walker.rigid_body
         names, free = tuple(body.parameter_names), self.walker.unknowns
-        parts = tuple((type(e).__name__, e.name) for e in self.walker.elements)
-        return self.form, body.backend, body.topology, names, parts, free, self.costs.structure
+        elements = tuple((type(e).__name__, e.name) for e in self.walker.elements)
+        contact = body.topology, self.walker.parts.feet, self.walker.parts.contact
+        return self.form, body.backend, contact, names, elements, free, self.costs.structure
 
     def build(self) -> MultiPhaseProblem:
         """Return the problem's structure."""
-        following = [PHASES[(i + 1) % len(PHASES)] for i in range(len(self.phases))]
+        following = self.pattern.following[: len(self.phases)]
         return MultiPhaseProblem(
             states=self.states,
             smooth=self.activations,
@@ -190,8 +192,8 @@ class GaitProblem:
         return theta
 
     @cached_property
-    def _torques(self) -> tuple[ca.SX, FrozenTerms]:
-        """Generalised forces of all elements (10,) [N, N m], with frozen curves."""
+    def _torques(self) -> tuple[ca.SX, ca.SX, FrozenTerms]:
+        """Forces of all elements [N m] and their sum (10,) [N, N m], with frozen curves."""
         frozen, walker = FrozenTerms(), self.walker
         moving = ca.vertcat(self.states.symbol, self.activations.symbol, self.parameters.symbol)
 
@@ -205,7 +207,7 @@ class GaitProblem:
         forces = element_forces(walker.elements, state, numbers, curve)
         names = walker.skeleton.coordinates
         total = generalised_forces(walker.elements, forces, names, ca.SX(1, 1))
-        return ca.vertcat(*total), frozen
+        return ca.vertcat(*forces), ca.vertcat(*total), frozen
 
     def _phase(self, contact: ContactPhase, following: ContactPhase) -> Phase:
         body, theta = self.walker.rigid_body, self._theta
@@ -214,8 +216,8 @@ class GaitProblem:
         sizes = choices.ACCELERATION_SIZE, choices.CONTACT_FORCE_SIZE, choices.FORCE_SIZE
         z = Variables.make("z", names, np.repeat(sizes, counts))
         vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
-        tau, frozen = self._torques
-        jacobian = _of(body.point_jacobian(self.q, theta), contact.forces)
+        _, tau, frozen = self._torques
+        jacobian = self._of(body.point_jacobian(self.q, theta), contact.forces)
         balance = body.inverse_dynamics(self.q, self.v, vdot, theta) - tau - reserve
         balance -= jacobian.T @ force
         position, velocity, acceleration = self._point_motion(vdot)
@@ -227,17 +229,17 @@ class GaitProblem:
             derivative=ca.vertcat(self.v, vdot),
             residual=Rows.join(
                 Rows.make(balance, equations, choices.FORCE_SIZE),
-                _rows(acceleration, contact.forces, still, choices.FORCE_SIZE),
+                self._rows(acceleration, contact.forces, still, choices.FORCE_SIZE),
             ),
             path=self._path(contact, force, position),
             end=self._touch_down(contact.touched_down(following), position, velocity, acceleration),
             fixed_at_end=self._fixed_at_end(contact, following),
-            integrands=self._integrands(contact, vdot, force, reserve),
+            integrands=self._integrands(contact, vdot, force, reserve, position, velocity),
             frozen=frozen,
         )
 
     def _point_motion(self, vdot: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-        """Return positions, velocities and accelerations of the contact points, (8,) each."""
+        """Return positions, velocities and accelerations of the contacts, (8,) each."""
         body, theta, q, v = self.walker.rigid_body, self._theta, self.q, self.v
         return (
             body.point_positions(q, theta),
@@ -246,11 +248,21 @@ class GaitProblem:
         )
 
     def _integrands(
-        self, contact: ContactPhase, vdot: ca.SX, force: ca.SX, reserve: ca.SX
+        self,
+        contact: ContactPhase,
+        vdot: ca.SX,
+        force: ca.SX,
+        reserve: ca.SX,
+        position: ca.SX,
+        velocity: ca.SX,
     ) -> ca.SX:
         a, rate = self.activations.symbol, self.rates.symbol
         columns = (self.q, self.v, a, force, rate, excitation_from_rate(rate, a), vdot, reserve)
-        point = Instant(contact, *(ca.vertsplit(x) for x in (*columns, self.reference)))
+        air = self.pattern.in_the_air(contact)
+        heights, speeds = position[[2 * i + 1 for i in air]], velocity[[2 * i for i in air]]
+        worn = self._torques[0][self.walker.columns(self.walker.device.forces)]
+        known = *columns, self.reference, heights, speeds, worn
+        point = Instant(contact, *(ca.vertsplit(x) if x.numel() else [] for x in known))
         numbers = ca.vertsplit(self.constants.cost_numbers)
         return ca.vertcat(*self.costs.integrands(point, numbers))
 
@@ -266,8 +278,10 @@ class GaitProblem:
 
     def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
         """Return heights of the points in the air and the friction cones of the loaded feet."""
-        airborne = [f for f in FORCES if f.bears and f.point not in contact.points]
-        rows = [_rows(position, airborne, "{0.point.name} height", choices.HEIGHT_SIZE, INFINITY)]
+        places = [self.pattern.points[i] for i in self.pattern.in_the_air(contact)]
+        airborne = [ContactForce(place, "z") for place in places]
+        height = "{0.point.name} height"
+        rows = [self._rows(position, airborne, height, choices.HEIGHT_SIZE, INFINITY)]
         for side in sorted(contact.feet):
             parts = [(f, force[i]) for i, f in enumerate(contact.forces) if f.point.side == side]
             normal = sum(value for f, value in parts if f.bears)
@@ -278,9 +292,12 @@ class GaitProblem:
             rows.append(Rows.make(value, names, choices.CONTACT_FORCE_SIZE, 0.0, INFINITY))
         return Rows.join(*rows)
 
-    @staticmethod
     def _touch_down(
-        directions: Sequence[ContactForce], position: ca.SX, velocity: ca.SX, acceleration: ca.SX
+        self,
+        directions: Sequence[ContactForce],
+        position: ca.SX,
+        velocity: ca.SX,
+        acceleration: ca.SX,
     ) -> Rows:
         """Return the rows that let new points meet the ground without impact and without force.
 
@@ -288,9 +305,9 @@ class GaitProblem:
         """
         upward = [f for f in directions if f.bears]
         return Rows.join(
-            _rows(position, upward, "{0.point.name} touch-down", choices.HEIGHT_SIZE),
-            _rows(velocity, directions, "{0.name} touch-down velocity"),
-            _rows(acceleration, directions, "{0.name} touch-down force", choices.FORCE_SIZE),
+            self._rows(position, upward, "{0.point.name} touch-down", choices.HEIGHT_SIZE),
+            self._rows(velocity, directions, "{0.name} touch-down velocity"),
+            self._rows(acceleration, directions, "{0.name} touch-down force", choices.FORCE_SIZE),
         )
 
     @staticmethod
@@ -321,7 +338,7 @@ class GaitProblem:
             self.parameters,
             self.costs,
             self._weights,
-            len(self.phases),
+            self.phases,
             self.form == "step",
             self._standing() if self.form == "passage" else None,
         )
@@ -332,21 +349,25 @@ class GaitProblem:
         position, velocity, _ = self._point_motion(ca.SX.zeros(len(COORDINATES)))
         upward = [f for f in forces if f.bears]
         return Rows.join(
-            _rows(position, upward, "{0.point.name} height at the start", choices.HEIGHT_SIZE),
-            _rows(velocity, forces, "{0.name} velocity at the start"),
+            self._rows(position, upward, "{0.point.name} height at the start", choices.HEIGHT_SIZE),
+            self._rows(velocity, forces, "{0.name} velocity at the start"),
         )
 
+    def _of(self, values: ca.SX, forces: Sequence[ContactForce]) -> ca.SX:
+        """Return the rows, among those of all forces, of some of them."""
+        return values[[self.pattern.forces.index(force) for force in forces], :]
 
-def _of(values: ca.SX, forces: Sequence[ContactForce]) -> ca.SX:
-    """Return the rows, among those of all `FORCES`, of some of them."""
-    return values[[force.index for force in forces], :]
-
-
-def _rows(
-    values: ca.SX, forces: Sequence[ContactForce], name: str, scale: float = 1.0, upper: float = 0.0
-) -> Rows:
-    """Return constraint rows in the directions of some forces; `name` is filled in with each."""
-    return Rows.make(_of(values, forces), tuple(name.format(f) for f in forces), scale, 0.0, upper)
+    def _rows(
+        self,
+        values: ca.SX,
+        forces: Sequence[ContactForce],
+        name: str,
+        scale: float = 1.0,
+        upper: float = 0.0,
+    ) -> Rows:
+        """Return rows in the directions of some forces; `name` is filled in with each."""
+        names = tuple(name.format(force) for force in forces)
+        return Rows.make(self._of(values, forces), names, scale, 0.0, upper)
 
 
 def _friction_names(side: Side) -> tuple[str, str]:

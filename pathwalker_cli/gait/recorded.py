@@ -79,10 +79,11 @@ def recorded_stride(walker: Walker, recording: CompactRecording) -> ReferenceStr
     pairs = zip(gaps, choices.PHASE_SPLITS, strict=True)
     durations = np.array([part for gap, s in pairs for part in (gap * s, gap - gap * s)])
     closed[:, _TX] -= closed[0, _TX]
-    closed[:, _TZ] -= np.mean([walker.contact_points(q)[:, 1].min() for q in closed])
+    closed[:, _TZ] -= np.mean([walker.foot_points(q)[:, 1].min() for q in closed])
     grid = np.linspace(0.0, period, len(closed))
     trajectory = Trajectory(grid, COORDINATES, closed, recording.motion.units)
-    return ReferenceStride(f"recording {recording.name}", trajectory, durations)
+    phases = walker.pattern.durations(durations)
+    return ReferenceStride(f"recording {recording.name}", trajectory, phases)
 
 
 def recorded_passage(walker: Walker, recording: CompactRecording) -> ReferenceStride:
@@ -96,7 +97,7 @@ def recorded_passage(walker: Walker, recording: CompactRecording) -> ReferenceSt
         DataError: If the recording holds no such stride.
     """
     motion = recording.motion
-    heights = np.array([walker.contact_points(q)[:, 1] for q in motion.values])
+    heights = np.array([walker.foot_points(q)[:, 1] for q in motion.values])
     cuts = _phase_frames(_passage_frames(recording), heights, recording.name)
     part = slice(cuts[0], cuts[-1] + 1)
     values = motion.values[part].copy()
@@ -104,7 +105,7 @@ def recorded_passage(walker: Walker, recording: CompactRecording) -> ReferenceSt
     # the plantar points of a standing foot are the ground, wherever the markers put it
     values[:, _TZ] -= float(np.median(heights[part].min(axis=1)))
     time = motion.time[part] - motion.time[cuts[0]]
-    durations = np.diff(motion.time[cuts])
+    durations = walker.pattern.durations(np.diff(motion.time[cuts]))
     name = f"recording {recording.name} from {motion.time[cuts[0]]:.4f} s"
     return ReferenceStride(name, Trajectory(time, motion.names, values, motion.units), durations)
 

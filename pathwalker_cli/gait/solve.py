@@ -80,7 +80,7 @@ class GaitSolver:
         if self.config.start.gait == "recorded":
             _ = self.stride  # a missing recording is refused before anything is built
         if self.config.fits:
-            self.bounds = recorded_durations(self.bounds, self.stride.durations)
+            self.bounds = recorded_durations(self.bounds, self._durations)
         self.blocks = gait_blocks(self.gait, self.config.mesh.degree)
         self.seconds["build"] += time.perf_counter() - began
 
@@ -117,6 +117,12 @@ class GaitSolver:
             return follow(self.walker, start_recording(self.walker, start))
         crouch, ratio = start.knee_flexion, start.stride_ratio
         return stylised_stride(self.walker, self.start_speed, crouch, ratio)
+
+    @property
+    def _durations(self) -> dict[str, float]:
+        """Durations of the phases of that stride by name [s]."""
+        durations = self.stride.durations.tolist()
+        return dict(zip(self.walker.pattern.names, durations, strict=True))
 
     @property
     def start_speed(self) -> float:
@@ -218,7 +224,7 @@ class GaitSolver:
         mesh = self.config.mesh
         motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])
         if not self.config.fits:
-            motion = with_goal_costs(motion, self.gait.costs, self.walker.weight)
+            motion = with_goal_costs(motion, self.gait.costs, self.walker)
         if mesh.refinements > 0:
             return motion
         return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
@@ -273,7 +279,7 @@ class GaitSolver:
         """
         mesh, stride, unknowns = self.config.mesh, self.stride, self.walker.unknowns
         held = self.parameter_guess() * [choices.FADED if u.faded else 1.0 for u in unknowns]
-        table = tracking_bounds(self.bounds, stride.durations, self.by_name(held))
+        table = tracking_bounds(self.bounds, self._durations, self.by_name(held))
         meshes = meshing.first(stride.durations[: len(self.gait.phases)], mesh)
         costs = len(self.gait.costs.integrals)
         motion = stride.motion(self.walker, held, meshes, mesh.degree, costs)

@@ -10,7 +10,6 @@ from scipy.interpolate import CubicSpline
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.gait import choices
-from pathwalker_cli.model.contact import PHASES
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times
 from pathwalker_cli.trajectory import Trajectory
@@ -22,8 +21,8 @@ class ReferenceStride:
 
     Args:
         name: Where it comes from, for records.
-        trajectory: `conventions.COORDINATES` over one stride from the start of right_flat on.
-        durations: Phase durations [s], shape (8,).
+        trajectory: `conventions.COORDINATES` over one stride from left toe-off on.
+        durations: Durations of the phases of the walker's pattern [s], shape (k,).
     """
 
     name: str
@@ -60,14 +59,14 @@ class ReferenceStride:
             degree: Number of collocation points in an interval.
             integrals: Number of running costs.
         """
-        weight, rest = walker.weight, (degree, integrals)
-        phases = tuple(self._phase(weight, i, mesh, *rest) for i, mesh in enumerate(meshes))
+        rest = degree, integrals
+        phases = tuple(self._phase(walker, i, mesh, *rest) for i, mesh in enumerate(meshes))
         return PhasedMotion(phases, np.asarray(parameters, float))
 
     def _phase(
-        self, weight: float, i: int, mesh: np.ndarray, degree: int, integrals: int
+        self, walker: Walker, i: int, mesh: np.ndarray, degree: int, integrals: int
     ) -> PhaseMotion:
-        contact, count = PHASES[i], len(mesh)
+        contact, count, weight = walker.pattern.phases[i], len(mesh), walker.weight
         points = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation_times(degree)
         bearing = [force.bears for force in contact.forces]
         still = np.zeros(len(COORDINATES))  # accelerations before the forces, reserves behind them

@@ -61,7 +61,8 @@ def stylised_stride(
     """Return a stylised stride; at least 0.1 sqrt(g leg length) fast."""
     slowest = choices.SLOWEST * float(np.sqrt(GRAVITY * walker.leg_length))
     gait = StylisedGait(max(walking_speed, slowest), stride_ratio * walker.leg_length, knee_flexion)
-    return ReferenceStride("synthetic", stylised_trajectory(walker, gait), gait.durations)
+    durations = walker.pattern.durations(gait.durations)
+    return ReferenceStride("synthetic", stylised_trajectory(walker, gait), durations)
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pathwalker_cli.conventions import COORDINATES, GENERATORS, mirror_permutati
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.problem import ACCELERATIONS, RESERVES, VELOCITIES
-from pathwalker_cli.model.contact import PHASES
+from pathwalker_cli.model.contact import mirrored_phase, phase_named
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
@@ -20,12 +20,15 @@ def asymmetries(walker: Walker) -> list[str]:
     """Return in words what differs between the sides of a walker."""
     model, strengths = walker.model, walker.max_isometric_torque
     order = mirror_permutation(COORDINATES)
-    right, left = np.split(walker.contact_points(np.zeros(len(COORDINATES))), 2)
+    right, left = np.split(walker.foot_points(np.zeros(len(COORDINATES))), 2)
+    shapes = {n.place: walker.values[n.address] for n in walker.parts.shapes}
+    round_alike = all(shapes[n.place] == walker.values[n.address] for n in walker.parts.shapes)
     q = np.linspace(-0.3, 0.6, len(COORDINATES))
     bias, swapped = (pin.nonLinearEffects(model, model.createData(), k, k) for k in (q, q[order]))
     alike = {
         "strengths": np.allclose(strengths, strengths[mirror_permutation(GENERATORS)]),
-        "contact points": np.allclose(right, left),
+        "contact points": np.allclose(right, left) and round_alike,
+        "contacts": len(set(walker.parts.contact)) == 1,
         "masses or lengths": np.allclose(bias, swapped[order], rtol=1e-9, atol=1e-9),
         "orthoses": walker.orthosis is None or walker.orthosis[0] == walker.orthosis[1],
     }
@@ -60,17 +63,17 @@ def full_stride(step: PhasedMotion) -> PhasedMotion:
     """Return the stride whose second half is a step's mirror image.
 
     Args:
-        step: Motion in the first four phases; it ends in its own mirrored beginning.
+        step: Motion in the phases of the right step; it ends in its own mirrored beginning.
     """
     length = walked_distance(step)
     costs = step.phases[-1].integrals[-1] - step.phases[0].integrals[0]
-    second = tuple(_mirrored(phase, i, length, costs) for i, phase in enumerate(step.phases))
+    second = tuple(_mirrored(phase, length, costs) for phase in step.phases)
     return PhasedMotion(step.phases + second, step.parameters)
 
 
-def _mirrored(phase: PhaseMotion, i: int, length: float, costs: np.ndarray) -> PhaseMotion:
+def _mirrored(phase: PhaseMotion, length: float, costs: np.ndarray) -> PhaseMotion:
     """Return a phase with left and right exchanged, one step on."""
-    here, there = PHASES[i], PHASES[i + len(PHASES) // 2]
+    here, there = phase_named(phase.name), mirrored_phase(phase.name)
     order, muscles = mirror_permutation(COORDINATES + VELOCITIES), mirror_permutation(GENERATORS)
     names = ACCELERATIONS + here.force_names + RESERVES
     wanted = ACCELERATIONS + there.force_names + RESERVES

@@ -119,6 +119,11 @@ class Sides(YamlModel, Generic[T]):
             return value
         return value if isinstance(value, cls) else {"right": value, "left": value}
 
+    def __str__(self) -> str:
+        """Return the one value of both sides, or both as a file gives them."""
+        both = str(self.right), str(self.left)
+        return both[0] if both[0] == both[1] else f"{{right: {both[0]}, left: {both[1]}}}"
+
     def __getitem__(self, side: str) -> T:
         """Return the value of "right" or "left"."""
         return {"right": self.right, "left": self.left}[side]

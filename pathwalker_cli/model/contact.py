@@ -1,33 +1,53 @@
-"""Contact with the ground as data: points of the feet, their forces, and the walking pattern.
+"""Contact with the ground as data: places of the feet, their forces, and patterns of walking.
 
-Phases, in order, follow Sreenivasa et al. (2017), section 2.3: one right and one left step.
+A pattern is the order in which places of the feet stand on the ground over a stride: one right and
+one left step.  That of Sreenivasa et al. (2017), section 2.3, is "heel_toe" on both sides.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Final, Literal
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
 
 from pathwalker_cli.errors import InputError
+from pathwalker_cli.model.choices import ROCKER_SHARES, ROUNDNESS
+from pathwalker_cli.model.numbers import Number
 from pathwalker_cli.model.skeleton import SIDES, SUFFIX, Side
+
+if TYPE_CHECKING:
+    from pathwalker_cli.patient import Patient
+
+Feet = Literal["points", "rockers", "sole"]
+"""What feet touch the ground with: heel and toe as points, the same as circles that roll without
+slipping, or one convex sole that rolls from heel to toe."""
+
+Use = Literal["heel_toe", "flat", "toe"]
+"""How a foot with heel and toe is used: lands on the heel and then the toe, lands flat, or walks on
+the toe alone."""
+
+Contact = tuple[Use, Use]
+"""Use of the right and the left foot."""
 
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """A point of a foot that may stand on the ground.
+    """A place of a foot that may stand on the ground.
 
     Args:
         place: Where on the foot.
         side: Which foot.
     """
 
-    place: Literal["heel", "toe"]
+    place: Literal["heel", "toe", "sole"]
     side: Side
 
     @property
     def name(self) -> str:
-        """Name of the point and of its frame, e.g. "heel_r"."""
+        """Name of the place, e.g. "heel_r"; of heel and toe also that of its frame."""
         return f"{self.place}_{SUFFIX[self.side]}"
 
     @property
@@ -35,10 +55,28 @@ class ContactPoint:
         """The link that carries it."""
         return f"foot_{SUFFIX[self.side]}"
 
+    @cached_property
+    def shape(self) -> Number:
+        """Radius of the circle of heel or toe [m], roundness of the sole [-]."""
+        if self.place == "sole":
+            return Number(
+                f"sole_roundness.{self.side}", "sole_roundness", "roundness of the sole", "1",
+                self.side, ROUNDNESS, "see model.choices",
+            )  # fmt: skip
+
+        def by_length(patient: Patient) -> float:
+            return ROCKER_SHARES[self.place] * patient.length("foot", self.side)
+
+        return Number(
+            f"rocker_radius.{self.place}.{self.side}", f"{self.place}_radius",
+            f"radius of the {self.place} rocker", "m", self.side, by_length,
+            "share of the length of the foot, see model.choices",
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class ContactForce:
-    """One component of the ground reaction force on a point, and the direction it blocks.
+    """One component of the ground reaction force on a place, and the direction it blocks.
 
     Args:
         point: Where it acts.
@@ -58,18 +96,6 @@ class ContactForce:
         """Whether it is the vertical component."""
         return self.axis == "z"
 
-    @property
-    def index(self) -> int:
-        """Its position in `FORCES`."""
-        return FORCES.index(self)
-
-
-POINTS: Final = tuple(ContactPoint(place, side) for side in SIDES for place in ("heel", "toe"))
-"""All contact points in order."""
-
-FORCES: Final = tuple(ContactForce(point, axis) for point in POINTS for axis in ("x", "z"))
-"""All components of the ground reaction forces (on the body) in order [N]."""
-
 
 @dataclass(frozen=True)
 class ContactPhase:
@@ -77,11 +103,13 @@ class ContactPhase:
 
     Args:
         name: Name of the phase.
-        forces: Active components; each stands for one direction in which its point does not move.
+        forces: Active components; each stands for one direction in which its place does not move.
+        step: The side that stands while the other one swings and lands.
     """
 
     name: str
     forces: tuple[ContactForce, ...]
+    step: Side
 
     @cached_property
     def force_names(self) -> tuple[str, ...]:
@@ -90,7 +118,7 @@ class ContactPhase:
 
     @cached_property
     def points(self) -> tuple[ContactPoint, ...]:
-        """Contact points on the ground."""
+        """Places on the ground."""
         return tuple(dict.fromkeys(force.point for force in self.forces))
 
     @property
@@ -99,48 +127,156 @@ class ContactPhase:
         standing = {point.side for point in self.points}
         return tuple(side for side in SIDES if side in standing)
 
-    @cached_property
-    def indices(self) -> tuple[int, ...]:
-        """Positions of the active components in `FORCES`."""
-        return tuple(force.index for force in self.forces)
-
     def touched_down(self, following: ContactPhase) -> tuple[ContactForce, ...]:
-        """Return the directions in which new points are stopped when the next phase begins."""
+        """Return the directions in which new places are stopped when the next phase begins."""
         return tuple(force for force in following.forces if force.point not in self.points)
 
     def lifted_off(self, following: ContactPhase) -> tuple[ContactForce, ...]:
         """Return the forces that have faded to zero when the next phase begins.
 
-        While its foot stays on the ground a point loses its vertical force only: the friction
+        While its foot stays on the ground a place loses its vertical force only: the friction
         of a rigid foot may pass from heel to toe at once.
         """
         gone = [force for force in self.forces if force.point not in following.points]
         return tuple(f for f in gone if f.bears or f.point.side not in following.feet)
 
 
-def _on(side: Side, *components: str) -> tuple[ContactForce, ...]:
-    """Return components of a foot in the order of `FORCES`, e.g. "heel x"."""
-    return tuple(
-        f for f in FORCES if f.point.side == side and f"{f.point.place} {f.axis}" in components
-    )
+@dataclass(frozen=True)
+class ContactPattern:
+    """The phases of a stride, from left toe-off on, and the places that take part.
+
+    Args:
+        points: All places, right before left; those that never stand may not sink either.
+        phases: The phases in order.
+    """
+
+    points: tuple[ContactPoint, ...]
+    phases: tuple[ContactPhase, ...]
+
+    @cached_property
+    def forces(self) -> tuple[ContactForce, ...]:
+        """All components of the ground reaction forces (on the body) in order [N]."""
+        return tuple(ContactForce(point, axis) for point in self.points for axis in ("x", "z"))
+
+    @cached_property
+    def force_names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(force.name for force in self.forces)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the phases."""
+        return tuple(phase.name for phase in self.phases)
+
+    @cached_property
+    def steps(self) -> tuple[tuple[ContactPhase, ...], tuple[ContactPhase, ...]]:
+        """The phases of the right step and of the left one."""
+        right, left = (tuple(p for p in self.phases if p.step == side) for side in SIDES)
+        return right, left
+
+    @cached_property
+    def following(self) -> tuple[ContactPhase, ...]:
+        """The phase that comes after each, of the last one the first."""
+        return self.phases[1:] + self.phases[:1]
+
+    def indices(self, phase: ContactPhase) -> list[int]:
+        """Return the positions of a phase's components in `forces`."""
+        return [self.forces.index(force) for force in phase.forces]
+
+    def rows(self, side: Side) -> list[int]:
+        """Return the positions of the places of a side in `points`."""
+        return [i for i, point in enumerate(self.points) if point.side == side]
+
+    def in_the_air(self, phase: ContactPhase) -> list[int]:
+        """Return the positions in `points` of the places that are not on the ground."""
+        return [i for i, point in enumerate(self.points) if point not in phase.points]
+
+    def strike(self, side: Side) -> int:
+        """Return the number of the phase that begins with the foot strike of a side."""
+        pairs = zip(self.following, self.phases, strict=True)
+        came = [side in after.feet and side not in phase.feet for after, phase in pairs]
+        return (came.index(True) + 1) % len(self.phases)
+
+    def toe_off(self, side: Side) -> int:
+        """Return the number of the phase that begins with the toe-off of a side."""
+        pairs = zip(self.following, self.phases, strict=True)
+        went = [side in phase.feet and side not in after.feet for after, phase in pairs]
+        return (went.index(True) + 1) % len(self.phases)
+
+    def durations(self, parts: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return the durations of the phases from those of `PHASES` [s].
+
+        A single or double support that has one phase takes the time of the two that it has there.
+        """
+        result: list[float] = []
+        for step, quarters in zip(self.steps, np.split(np.asarray(parts, float), 2), strict=True):
+            for support, pair in zip((1, 2), np.split(quarters, 2), strict=True):
+                count = sum(len(phase.feet) == support for phase in step)
+                result += pair.tolist() if count == len(pair) else [float(pair.sum())]
+        return np.array(result)
 
 
-def _step(side: Side, other: Side) -> tuple[ContactPhase, ...]:
-    """Return the four phases from single support of a foot to double support of both."""
-    flat, toe = ("heel x", "heel z", "toe z"), ("toe x", "toe z")
-    standing, landing = _on(side, *toe), _on(other, "heel x", "heel z")
-    return (
-        ContactPhase(f"{side}_flat", _on(side, *flat)),
-        ContactPhase(f"{side}_toe", standing),
-        ContactPhase(f"{side}_toe_{other}_heel", standing + landing),
-        ContactPhase(f"{side}_toe_{other}_flat", standing + _on(other, *flat)),
-    )
+POINTS: Final = tuple(ContactPoint(place, side) for side in SIDES for place in ("heel", "toe"))
+"""Heel and toe of both feet, the ends of their soles."""
+
+_SOLES: Final = tuple(ContactPoint("sole", side) for side in SIDES)
+
+_SINGLE: Final = {"heel_toe": ("flat", "toe"), "flat": ("flat", "toe"), "toe": ("toe",)}
+_LANDING: Final = {"heel_toe": ("heel", "flat"), "flat": ("flat",), "toe": ("toe",)}
+"""What of a foot is on the ground, in order: while the other swings, and after it has landed."""
 
 
-PHASES: Final = _step("right", "left") + _step("left", "right")
-"""The eight phases of a stride."""
+def _on(side: Side, posture: str) -> tuple[ContactForce, ...]:
+    """Return the components of a foot on the ground; flat, friction counts once."""
+    if posture == "flat":
+        heel, toe = (ContactPoint(place, side) for place in ("heel", "toe"))
+        return ContactForce(heel, "x"), ContactForce(heel, "z"), ContactForce(toe, "z")
+    place = next(p for p in (*POINTS, *_SOLES) if p.side == side and p.place == posture)
+    return ContactForce(place, "x"), ContactForce(place, "z")
 
-PHASE_NAMES: Final = tuple(phase.name for phase in PHASES)
+
+def _step(side: Side, single: Sequence[str], landing: Sequence[str]) -> list[ContactPhase]:
+    """Return the phases from single support of a foot to double support of both."""
+    other: Side = "left" if side == "right" else "right"
+    last = single[-1]
+    return [
+        *(ContactPhase(f"{side}_{posture}", _on(side, posture), side) for posture in single),
+        *(
+            ContactPhase(
+                f"{side}_{last}_{other}_{posture}", _on(side, last) + _on(other, posture), side
+            )
+            for posture in landing
+        ),
+    ]
+
+
+@cache
+def contact_pattern(
+    feet: Feet = "points", contact: Contact = ("heel_toe", "heel_toe")
+) -> ContactPattern:
+    """Return the pattern of feet that are used like this."""
+    if feet == "sole":
+        phases = [p for side in SIDES for p in _step(side, ("sole",), ("sole",))]
+        return ContactPattern(_SOLES, tuple(phases))
+    use = dict(zip(SIDES, contact, strict=True))
+    right = _step("right", _SINGLE[use["right"]], _LANDING[use["left"]])
+    left = _step("left", _SINGLE[use["left"]], _LANDING[use["right"]])
+    return ContactPattern(POINTS, (*right, *left))
+
+
+PHASES: Final = contact_pattern().phases
+"""The eight phases of a stride from heel to toe."""
+
+_USES: Final[tuple[Use, ...]] = ("heel_toe", "flat", "toe")
+PATTERNS: Final = (
+    *(contact_pattern("points", (right, left)) for right in _USES for left in _USES),
+    contact_pattern("sole"),
+)
+"""All patterns that there are."""
+
+_NAMED: Final = {phase.name: phase for pattern in PATTERNS for phase in pattern.phases}
+PHASE_NAMES: Final = tuple(_NAMED)
+"""Names of the phases of all patterns."""
 
 
 def phase_named(phase: str | int) -> ContactPhase:
@@ -151,7 +287,12 @@ def phase_named(phase: str | int) -> ContactPhase:
     """
     if isinstance(phase, int) and 0 <= phase < len(PHASES):
         return PHASES[phase]
-    for candidate in PHASES:
-        if candidate.name == phase:
-            return candidate
+    if phase in _NAMED:
+        return _NAMED[str(phase)]
     raise InputError(f"there is no phase {phase!r}", allowed=", ".join(PHASE_NAMES))
+
+
+def mirrored_phase(name: str) -> ContactPhase:
+    """Return the phase in which left and right are exchanged."""
+    swapped = {"right": "left", "left": "right"}
+    return _NAMED["_".join(swapped.get(word, word) for word in name.split("_"))]

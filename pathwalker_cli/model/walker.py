@@ -5,29 +5,33 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Final
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import CONDITIONS, CONTACT_FORCES, CONTACT_POINTS, SIDES, Condition
+from pathwalker_cli.conventions import CONDITIONS, SIDES, Condition
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.backends import rigid_body_functions
 from pathwalker_cli.model.backends.functions import RigidBodyFunctions
-from pathwalker_cli.model.contact import ContactPhase, phase_named
-from pathwalker_cli.model.devices import DEVICES, Device
+from pathwalker_cli.model.contact import (
+    POINTS,
+    Contact,
+    ContactPattern,
+    ContactPhase,
+    Feet,
+    phase_named,
+)
+from pathwalker_cli.model.devices import Device
 from pathwalker_cli.model.elements import ForceElement, State, element_forces, generalised_forces
-from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
+from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator
 from pathwalker_cli.model.elements.orthosis import OrthosisSide
-from pathwalker_cli.model.elements.tissue import leg_tissue
-from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at
+from pathwalker_cli.model.numbers import Number, Unknown
+from pathwalker_cli.model.parts import Parts
 from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
-
-_MUSCLES: Final = generators()
-_TISSUE: Final = leg_tissue()
 
 
 @dataclass(frozen=True)
@@ -36,26 +40,20 @@ class Walker:
 
     Args:
         patient: The patient.
-        condition: "barefoot" or "orthosis".
+        parts: What it is made of.
         skeleton: Bodies and joints; names and order of the coordinates.
         model: Rigid bodies in Pinocchio.
         rigid_body: The same as CasADi functions.
-        muscles: The muscle torque generators.
-        tissue: Force elements of the body beside the muscles.
-        device: What the patient walks with.
         values: Every named number by address [SI].
         unknowns: The numbers that a problem is free to choose.
         published: Whether it reproduces the quirks of the published model.
     """
 
     patient: Patient
-    condition: Condition
+    parts: Parts
     skeleton: Skeleton
     model: pin.Model
     rigid_body: RigidBodyFunctions
-    muscles: tuple[MuscleTorqueGenerator, ...]
-    tissue: tuple[ForceElement, ...]
-    device: Device
     values: Mapping[str, float]
     unknowns: tuple[Unknown, ...] = ()
     published: bool = False
@@ -65,10 +63,30 @@ class Walker:
         """Name of the dynamics back end at work."""
         return self.rigid_body.backend
 
-    @cached_property
+    @property
+    def condition(self) -> Condition:
+        """Its condition, "barefoot" or "orthosis"."""
+        return self.parts.condition
+
+    @property
+    def muscles(self) -> tuple[MuscleTorqueGenerator, ...]:
+        """The muscle torque generators."""
+        return self.parts.muscles
+
+    @property
+    def tissue(self) -> tuple[ForceElement, ...]:
+        """Force elements of the body beside the muscles."""
+        return self.parts.passive
+
+    @property
+    def device(self) -> Device:
+        """What the patient walks with."""
+        return self.parts.device
+
+    @property
     def elements(self) -> tuple[ForceElement, ...]:
         """All force elements: muscles, other tissue, then what the device adds."""
-        return (*self.muscles, *self.tissue, *self.device.forces)
+        return self.parts.elements
 
     def columns(self, elements: Iterable[ForceElement]) -> list[int]:
         """Return where the forces of some elements stand among those of all."""
@@ -76,10 +94,20 @@ class Walker:
         owners = [element.name for element in self.elements for _ in element.coordinates]
         return [i for i, owner in enumerate(owners) if owner in names]
 
-    @cached_property
+    @property
     def numbers(self) -> tuple[Number, ...]:
         """Every named number: of the elements, then of the bodies."""
-        return _numbers(self.elements, self.device)
+        return self.parts.numbers
+
+    @property
+    def pattern(self) -> ContactPattern:
+        """The order in which places of the feet stand on the ground."""
+        return self.parts.pattern
+
+    @property
+    def shapes(self) -> list[float]:
+        """Values of `Parts.shapes`: radii [m], then roundnesses [-]."""
+        return [self.values[number.address] for number in self.parts.shapes]
 
     @property
     def max_isometric_torque(self) -> np.ndarray:
@@ -108,12 +136,14 @@ class Walker:
         """Return the walker with other numbers, by address [SI]."""
         values = {**self.values, **values}
         changed = replace(self, values=values)
-        bodies = [n.address for n in self.device.added_mass.values()]
+        bodies = [n.address for n in self.parts.body_numbers]
         if all(values[address] == self.values[address] for address in bodies):
             return changed
         model = pinocchio_model(self.patient, self.condition, self.published, values)
-        body = replace(self.rigid_body, parameters=self.rigid_body.parameters_for(model))
-        return replace(changed, model=model, rigid_body=body)
+        parameters = self.rigid_body.parameters_for(model, changed.shapes)
+        return replace(
+            changed, model=model, rigid_body=replace(self.rigid_body, parameters=parameters)
+        )
 
     @property
     def total_mass(self) -> float:
@@ -131,16 +161,16 @@ class Walker:
         data, zero = self.model.createData(), np.zeros(self.model.nq)
         pin.forwardKinematics(self.model, data, zero)
         hip = np.mean([data.oMi[self.model.getJointId(f"hip_{s}")].translation[2] for s in "rl"])
-        return float(hip - self.contact_points(zero)[:, 1].mean())
+        return float(hip - self.foot_points(zero)[:, 1].mean())
 
     def moves_bodies(self, unknown: Unknown) -> bool:
         """Return whether an unknown is a number of the rigid bodies."""
-        return any(number in self.device.added_mass.values() for number in unknown.numbers)
+        return any(number in self.parts.body_numbers for number in unknown.numbers)
 
     def body_slopes(self, unknown: Unknown) -> np.ndarray:
-        """Return the derivatives of the rigid bodies' numbers in a mass of the device, shape (k,).
+        """Return the derivatives of the rigid bodies' numbers in one of `Parts.body_numbers`, (k,).
 
-        They are exact: masses and moments of inertia are linear in it, and nothing else changes.
+        They are exact: masses, moments of inertia and radii are linear in it.
         """
         values = {a: self.values[a] + 1.0 for a in unknown.addresses}
         return self.with_values(values).rigid_body.parameters - self.rigid_body.parameters
@@ -244,7 +274,7 @@ class Walker:
 
         Returns:
             vdot [m/s^2, rad/s^2], shape (10,), and forces on the body [N] in the order of
-            `conventions.CONTACT_FORCES`, shape (8,); zero where there is no contact.
+            `pattern.forces`, shape (8,); zero where there is no contact.
         """
         n, root = self.skeleton.size, len(self.skeleton.root)
         q, v, tau = _vector(q, n, "q"), _vector(v, n, "v"), np.asarray(tau, float).ravel()
@@ -267,7 +297,8 @@ class Walker:
         q, v and tau are of shape (m, 10); `terms` evaluates `dynamics_terms` at m points, if not
         the function itself.
         """
-        active = list((phase if isinstance(phase, ContactPhase) else phase_named(phase)).indices)
+        contact = phase if isinstance(phase, ContactPhase) else phase_named(phase)
+        active = self.pattern.indices(contact)
         count, n, size = len(q), self.skeleton.size, len(active)
         mass, bias, jacobian, drift = map(np.asarray, (terms or self.dynamics_terms)(q.T, v.T))
         # of m instants CasADi sets the matrices side by side
@@ -278,14 +309,41 @@ class Walker:
         matrix[:, :n, n:] = -jacobian.swapaxes(1, 2)
         right = np.hstack([tau - bias.T, -drift[active].T])[..., None]
         solution = np.linalg.solve(matrix, right)[..., 0]
-        forces = np.zeros((count, len(CONTACT_FORCES)))
+        forces = np.zeros((count, len(self.pattern.forces)))
         forces[:, active] = solution[:, n:]
         return solution[:, :n], forces
 
     def contact_points(self, q: Any) -> np.ndarray:
-        """Return right heel, right toe, left heel, left toe: x and z [m], shape (4, 2)."""
+        """Return where the places of `pattern.points` touch the ground, or would.
+
+        Args:
+            q: Generalised coordinates [m, rad], shape (10,).
+
+        Returns:
+            Forward and up [m], shape (k, 2): right heel, right toe, left heel, left toe; of soles
+            right and left.
+        """
         q, body = _vector(q, self.skeleton.size, "q"), self.rigid_body
-        return np.asarray(body.point_positions(q, body.parameters)).reshape(4, 2)
+        return np.asarray(body.point_positions(q, body.parameters)).reshape(-1, 2)
+
+    def foot_points(self, q: Any) -> np.ndarray:
+        """Return right heel, right toe, left heel, left toe: forward and up [m], shape (4, 2).
+
+        Args:
+            q: Generalised coordinates [m, rad], shape (10,).
+        """
+        data = self.model.createData()
+        pin.framesForwardKinematics(self.model, data, _vector(q, self.skeleton.size, "q"))
+        frames = [self.model.getFrameId(point.name) for point in POINTS]
+        return np.array([data.oMf[frame].translation[[0, 2]] for frame in frames])
+
+    @cached_property
+    def contact_motion(self) -> ca.Function:
+        """Function (q, v) -> positions (2 k,) [m] and velocities [m/s] of the pattern's places."""
+        body, theta = self.rigid_body, self.rigid_body.parameters
+        q, v = ca.SX.sym("q", body.nq), ca.SX.sym("v", body.nq)
+        values = body.point_positions(q, theta), body.point_velocities(q, v, theta)
+        return ca.Function("contact_motion", [q, v], [ca.densify(x) for x in values])
 
     @cached_property
     def dynamics_terms(self) -> ca.Function:
@@ -313,16 +371,10 @@ def build_walker(
     backend: str = "auto",
     free: Sequence[str] = (),
     tissue: bool = False,
+    feet: Feet = "points",
+    contact: Contact = ("heel_toe", "heel_toe"),
 ) -> Walker:
-    """Return the walking model of a patient.
-
-    Args:
-        patient: The patient.
-        condition: "barefoot" or "orthosis".
-        published: Reproduce the quirks of the published model (right forearm).
-        backend: Dynamics back end, see `model.backends`.
-        free: Addresses of numbers that a problem may choose, beside those that it looks for anyway.
-        tissue: Whether joints have passive torques.
+    """Return the walking model of a patient; see `Parts` and `walker_of`.
 
     Raises:
         InputError: If the condition does not exist.
@@ -333,61 +385,43 @@ def build_walker(
         raise InputError(
             f"there is no condition {condition!r}", allowed=" or ".join(map(repr, CONDITIONS))
         )
-    device = DEVICES[condition]
-    if device.worn:
-        patient.require_orthosis()
-    model = pinocchio_model(patient, condition, published)
-    numbers = _numbers((*_MUSCLES, *_passive(tissue), *device.forces), device)
-    values = {n.address: n.value_for(patient) for n in numbers}
-    return Walker(
-        patient=patient,
-        condition=condition,
-        skeleton=PLANAR_WALKER,
-        model=model,
-        rigid_body=rigid_body_functions(model, CONTACT_POINTS, backend),
-        muscles=_MUSCLES,
-        tissue=_passive(tissue),
-        device=device,
-        values=values,
-        unknowns=unknowns_of(condition, free, tissue),
-        published=published,
-    )
+    parts = Parts(condition, tissue, feet, contact)
+    return walker_of(patient, parts, published, backend, free)
 
 
-def _numbers(elements: Sequence[ForceElement], device: Device) -> tuple[Number, ...]:
-    """Return the numbers of elements, then those of the bodies."""
-    of_elements = (number for element in elements for number in element.numbers)
-    return (*of_elements, *device.added_mass.values())
-
-
-def _passive(tissue: bool) -> tuple[ForceElement, ...]:
-    return _TISSUE if tissue else ()
-
-
-def unknowns_of(
-    condition: Condition, free: Sequence[str] = (), tissue: bool = False
-) -> tuple[Unknown, ...]:
-    """Return what a problem chooses: what is asked for, and what a device is identified by.
-
-    What a device is identified for stands first, per kind right before left, unless both sides
-    alike are asked for.
+def walker_of(
+    patient: Patient,
+    parts: Parts,
+    published: bool = False,
+    backend: str = "auto",
+    free: Sequence[str] = (),
+) -> Walker:
+    """Return the walking model of a patient.
 
     Args:
-        condition: "barefoot" or "orthosis".
-        free: Addresses of numbers that are asked for.
-        tissue: Whether joints have passive torques.
+        patient: The patient.
+        parts: What it is made of.
+        published: Reproduce the quirks of the published model (right forearm).
+        backend: Dynamics back end, see `model.backends`.
+        free: Addresses of numbers that a problem may choose, beside those that it looks for anyway.
 
     Raises:
+        PatientError: If the patient lacks strengths or, for "orthosis", an orthosis.
         ConfigError: If there is no such number.
     """
-    device = DEVICES[condition]
-    numbers = _numbers((*_MUSCLES, *_passive(tissue), *device.forces), device)
-    asked = unknowns_at(free, numbers)
-    taken = {address for unknown in asked for address in unknown.addresses}
-    usual = [
-        Unknown.of(number)
-        for name in device.identified
-        for number in numbers
-        if number.name == name and number.address not in taken
-    ]
-    return (*usual, *asked)
+    if parts.device.worn:
+        patient.require_orthosis()
+    model = pinocchio_model(patient, parts.condition, published)
+    values = {n.address: n.value_for(patient) for n in parts.numbers}
+    frames, shapes = [point.name for point in POINTS], [values[n.address] for n in parts.shapes]
+    soles = parts.feet == "sole"
+    return Walker(
+        patient=patient,
+        parts=parts,
+        skeleton=PLANAR_WALKER,
+        model=model,
+        rigid_body=rigid_body_functions(model, frames, backend, shapes, soles),
+        values=values,
+        unknowns=parts.unknowns(free),
+        published=published,
+    )

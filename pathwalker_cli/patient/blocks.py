@@ -21,6 +21,9 @@ Offset = Annotated[
 Strength = Annotated[float, Quantity("N m", 0.1, 500.0)]
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
 Stiffness = Annotated[float, Quantity("N m/rad", 1.0, 1000.0, below="is it in N m per degree?")]
+_Radius = Annotated[float, Quantity("m", 0.0, 0.5, above="is it in centimetres or millimetres?")]
+Roundness = Annotated[float, Quantity("", 0.05, 50.0)]
+"""Radius of a sole where it lies flat, beside its length."""
 _Reach = Annotated[float, Quantity("deg", -90.0, 110.0)]
 Point = Annotated[tuple[Offset, Offset], AS_TUPLE]
 """A point in the foot frame: [forward, up] of the ankle [m]."""
@@ -75,6 +78,17 @@ class ContactPoints(YamlModel):
 
     barefoot: Sides[FootPoints] | None = None
     orthosis: Sides[FootPoints] | None = None
+
+
+class RockerRadius(YamlModel):
+    """Radii of the circles on which heel and ball of the foot roll [m], barefoot and shod.
+
+    They count in problems with `model.feet: rockers`; what is left out is a share of the length of
+    the foot.
+    """
+
+    heel: Sides[_Radius] | None = None
+    toe: Sides[_Radius] | None = None
 
 
 class Strengths(YamlModel):
@@ -188,6 +202,8 @@ class OrthosisData(YamlModel):
     stiffness_guess: Springs
     stiffness_range: SpringRange
     springs: SpringSet | None = None
+    cuff_height: Sides[Length] | None = None
+    cuff_area: Annotated[float, Quantity("m^2", 1e-4, 0.1, above="is it in cm^2?")] | None = None
 
     @model_validator(mode="after")
     def _springs(self) -> OrthosisData:

@@ -25,11 +25,15 @@ from pathwalker_cli.patient.blocks import (
     FootPoints,
     OrthosisData,
     Recorded,
+    RockerRadius,
+    Roundness,
     SegmentLengths,
     Strengths,
 )
 from pathwalker_cli.patient.proportions import (
     ANKLE_HEIGHT,
+    CUFF_AREA,
+    CUFF_HEIGHT,
     HEEL_SHARE,
     SOURCE,
     TOE_SHARE,
@@ -73,6 +77,8 @@ class Patient(YamlModel):
     height: Annotated[float, Quantity("m", 0.5, 2.2, above="is it in centimetres?")]
     segment_lengths: SegmentLengths = SegmentLengths()
     contact_points: ContactPoints = ContactPoints()
+    rocker_radius: RockerRadius = RockerRadius()
+    sole_roundness: Sides[Roundness] | None = None
     strengths: Strengths | None = None
     examination: Examination = Examination()
     orthosis: OrthosisData | None = None
@@ -218,6 +224,17 @@ class Patient(YamlModel):
             for side, foot in feet.items()
         }
         return Sides[FootPoints](**points)
+
+    def cuff_height(self, side: str) -> float:
+        """Return how far above the hinge the cuff of the orthosis presses on the leg [m]."""
+        default = CUFF_HEIGHT * self.length("shank", side)
+        return self.number(f"orthosis.cuff_height.{side}", default)
+
+    @property
+    def cuff_area(self) -> float:
+        """Area on which the cuff presses, in front or behind [m^2]."""
+        shank = sum(self.length("shank", side) for side in SIDES) / len(SIDES)
+        return self.number("orthosis.cuff_area", CUFF_AREA * shank**2)
 
     @property
     def leg_length(self) -> float:

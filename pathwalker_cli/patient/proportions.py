@@ -32,6 +32,12 @@ _BALL_SHARE: Final = 0.73
 ANKLE_HEIGHT: Final = 0.039
 """Height of the ankle above the sole, fraction of standing height."""
 
+CUFF_HEIGHT: Final = 0.7
+"""Middle of the cuff above the ankle, as a share of the shank: an orthosis ends 2 to 3 cm below the
+head of the fibula, and its band is some 5 cm high."""
+CUFF_AREA: Final = 0.06
+"""Area of the cuff over the squared length of the shank: 5 cm by half a calf's girth of a child."""
+
 HEEL_SHARE: Final = -0.35
 TOE_SHARE: Final = 0.65
 """Heel and toe in front of the ankle as shares of the model's foot length (published model)."""

@@ -187,7 +187,7 @@ def _outcome(solution: GaitSolution) -> dict[str, Any]:
         "smoke": config.smoke,
         "cost": solution.cost,
         "cost_terms": solution.cost_terms,
-        "goals": goal_values(solution.last_motion, walker.weight, config.cost.comfort_ranges),
+        "goals": goal_values(solution.last_motion, walker, config.cost.comfort_ranges),
     }
 
 

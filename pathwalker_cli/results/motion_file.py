@@ -16,7 +16,7 @@ from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.io.atomic import refuse_special
-from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
+from pathwalker_cli.model.contact import PATTERNS, PHASE_NAMES, phase_named
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
@@ -59,8 +59,9 @@ def read_motion(path: str | Path) -> PhasedMotion:
     arrays = read_arrays(Path(path))
     try:
         names = tuple(str(name) for name in arrays["phases"])
-        if names != PHASE_NAMES:
-            raise DataError("holds other phases", where=str(path), allowed=", ".join(PHASE_NAMES))
+        if names not in {pattern.names for pattern in PATTERNS}:
+            known = f"a stride of {', '.join(PHASE_NAMES)}"
+            raise DataError("holds other phases", where=str(path), allowed=known)
         durations, parameters = (_floats(arrays[key]) for key in ("durations", "parameters"))
         positive = np.isfinite(durations) & (durations > 0.0)
         if durations.shape != (len(names),) or not positive.all():
@@ -159,7 +160,7 @@ def _shapes(phase: PhaseMotion) -> dict[str, tuple[int, ...]]:
     degree = inner[1] if len(inner) == 3 else 1
     width = phase.integrals.shape[-1] if phase.integrals.ndim else 0
     costs = max(width, len(Costs().integrals))  # goals and fits add some
-    forces = len(phase_named(phase.name).indices)
+    forces = len(phase_named(phase.name).forces)
     return {
         "mesh": (nodes,),
         "states": (nodes, 2 * n),

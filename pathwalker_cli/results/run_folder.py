@@ -26,7 +26,6 @@ from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.recordings import write_recording
 from pathwalker_cli.io.yaml_file import validate
-from pathwalker_cli.model.walker import unknowns_of
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.patient import load_patient, recordings_beside
@@ -293,8 +292,10 @@ def load_run(folder: str | Path, allow_unconverged: bool = False) -> Run:
         _check_hash(folder / _MULTIPLIERS, metrics.get("multipliers_hash"))
     case = _kept_case(folder)
     config = case.config
-    expected = len(unknowns_of(config.condition, tuple(config.free), config.model.tissue))
-    if config.problem != metrics["problem"] or motion.parameters.size != expected:
+    expected = len(case.parts.unknowns(tuple(config.free)))
+    phases = tuple(phase.name for phase in motion.phases)
+    fits = motion.parameters.size == expected and phases == config.model.pattern.names
+    if config.problem != metrics["problem"] or not fits:
         where = str(folder / CONFIG)
         raise DataError("does not belong to metrics.json beside it", where=where)
     return Run(folder, metrics, motion, case, multipliers)

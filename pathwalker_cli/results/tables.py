@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import (
-    CONTACT_FORCES,
     COORDINATES,
     GENERATORS,
     ROOT,
@@ -65,7 +64,7 @@ def forces_table(series: GaitSeries) -> Trajectory:
             (f"foot_{SUFFIX[side]}_z", "N", series.vertical_force(side)),
             (f"centre_of_pressure_{SUFFIX[side]}_x", "m", centre_of_pressure(series, side)),
         ]
-    return _table(series, _columns(CONTACT_FORCES, "", "N", series.force), feet)
+    return _table(series, _columns(series.walker.pattern.force_names, "", "N", series.force), feet)
 
 
 def torques_table(series: GaitSeries) -> Trajectory:

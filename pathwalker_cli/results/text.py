@@ -99,6 +99,7 @@ def summary_rows(
         ("stride", f"{metrics['distance']:.3f} m in {metrics['stride_time']:.3f} s"),
         ("step length", ", ".join(steps)),
         ("least knee flexion in stance", ", ".join(knees)),
+        ("feet land on", ", ".join(_landing(metrics, side) for side in SIDES)),
     ]
     for name in STIFFNESSES:
         if (value := metrics.get(name)) is not None:
@@ -110,6 +111,13 @@ def summary_rows(
             value = measure.text(metrics[measure.key])
             rows.append((measure.label, f"{value} {measure.shown_unit}".rstrip()))
     return rows
+
+
+def _landing(metrics: Mapping[str, Any], side: str) -> str:
+    """Return what of a foot lands first, and where between heel and toe."""
+    index = metrics[f"strike_index_{side}"]
+    part = "rearfoot" if index < 1 / 3 else "midfoot" if index < 2 / 3 else "forefoot"
+    return f"{side} {part} ({100 * index:.0f} % of heel to toe)"
 
 
 def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = (), width: int = 0) -> str:

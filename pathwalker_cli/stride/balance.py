@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import CONTACT_POINTS
+from pathwalker_cli.stride.ground import touched
 from pathwalker_cli.stride.series import GaitSeries
 
 
@@ -119,14 +119,13 @@ class _State:
         force, moment, power = weight.copy(), np.cross(centre - origin, weight), 0.0
         pin.forwardKinematics(model, data, q, v)
         pin.updateFramePlacements(model, data)
-        for i, point in enumerate(CONTACT_POINTS):
-            frame = model.getFrameId(point)
-            place = np.array(data.oMf[frame].translation)
-            speed = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
-            fx, fz = series.force[k, 2 * i : 2 * i + 2]
+        ground = series.force[k].reshape(-1, 2)
+        for place, (fx, fz) in zip(touched(series.walker, data), ground, strict=True):
+            motion = pin.getFrameVelocity(model, data, place.frame, pin.LOCAL_WORLD_ALIGNED)
+            speed = motion.linear + np.cross(motion.angular, place.arm)
             load = np.array([fx, 0.0, fz])
             force += load
-            moment += np.cross(place - origin, load)
+            moment += np.cross(place.position - origin, load)
             power += float(load @ np.array(speed))
         return _State(
             energy=float(energy),

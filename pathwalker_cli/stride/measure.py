@@ -29,7 +29,7 @@ SECTIONS: Final = (WALK, KNEE, TRIAL, CYCLE, FORCE, LOADS, ANKLE, MUSCLE, WORK, 
 """Headings of tables, in order."""
 
 _DIGITS: Final = {"m/s": 3, "m": 3, "s": 3, "1": 3, "rad": 2, "rad^2": 3, "body weights": 2, "N": 1,
-                  "N m": 1, "N m/rad": 1, "s/m": 3, "1/min": 1, "J": 2}  # fmt: skip
+                  "N m": 1, "N m/rad": 1, "Pa": 0, "s/m": 3, "1/min": 1, "J": 2}  # fmt: skip
 """Digits after the point by unit; angles as degrees, shares of the stride in per cent."""
 
 _SHOWN_UNIT: Final = {"rad": "deg", "body weights": "BW", "1": ""}

@@ -67,7 +67,7 @@ def _peak_vertical_force(stride: Stride, side: Side) -> float:
 
 def _least_point_force(stride: Stride) -> float:
     """Return the least vertical force on a contact point in contact [N]."""
-    touching = contacts(tuple(stride.known("phase")))
+    touching = contacts(stride.walker, tuple(stride.known("phase")))
     return float(stride.known("point_force")[:, 1::2][touching].min())
 
 
@@ -103,7 +103,7 @@ def ankle_torque_line(stride: Stride, side: Side) -> tuple[float, float]:
     instant counts by its share of time.  Positive like a spring that resists dorsiflexion; NaN if
     the ankle does not move.
     """
-    rows = toe_bearing(tuple(stride.known("phase")), side)
+    rows = toe_bearing(stride.walker, tuple(stride.known("phase")), side)
     name = f"ankle_{SUFFIX[side]}"
     angle, weight = -stride.column(name)[rows], stride.weights[rows]
     torque = stride.known("net_torque")[rows, COORDINATES.index(name)]
@@ -131,6 +131,30 @@ def _ankle_extensor(stride: Stride, side: Side, of: str, mean: bool) -> float:
     """Return peak or mean of a quantity of the ankle extensor of a side."""
     values = stride.known(of)[:, GENERATORS.index(f"ankle_extension_{SUFFIX[side]}")]
     return float(stride.mean(values)) if mean else float(values.max())
+
+
+def _strike_index(stride: Stride, side: Side) -> float:
+    """Return where between heel (0) and toe (1) a foot first touches the ground."""
+    pose = stride.pose(stride.strike(side))
+    heel, toe = stride.walker.foot_points(pose)[2 * SIDES.index(side) :][:2]
+    pattern = stride.walker.pattern
+    places = stride.walker.contact_points(pose)[pattern.rows(side)]
+    landed = places[np.argmin(places[:, 1])]
+    return float((landed - heel) @ (toe - heel) / ((toe - heel) @ (toe - heel)))
+
+
+def _cuff_force(stride: Stride, side: Side, sign: float) -> float:
+    """Return the largest force of a cuff on the shin (+) or the calf (-) [N]."""
+    torque = stride.known("orthosis_torque")[:, SIDES.index(side)]
+    if not stride.walker.device.worn:
+        return float("nan")
+    return float(max(0.0, (sign * torque).max()) / stride.walker.patient.cuff_height(side))
+
+
+def _cuff_pressure(stride: Stride, side: Side) -> float:
+    """Return the largest mean pressure under a cuff [Pa]."""
+    peak = max(_cuff_force(stride, side, 1.0), _cuff_force(stride, side, -1.0))
+    return peak / stride.walker.patient.cuff_area if stride.walker.device.worn else float("nan")
 
 
 def _stiffness(stride: Stride, side: Side, first: int) -> float:
@@ -188,6 +212,9 @@ REGISTRY: tuple[Measure, ...] = (
             shown=False),
     Measure("body_weight", "body weight", "N", "weight, with orthoses if they are worn",
             lambda s: s.walker.weight, shown=False),
+    *per_side("strike_index_*", "strike index, *", "1",
+              "where from heel to toe a foot lands: rearfoot below 1/3, forefoot above 2/3 "
+              "(Cavanagh and Lafortune 1980)", _strike_index, section=WALK, shown=False),
     *per_side("peak_vertical_force_*", "peak vertical force, *", "N",
               "largest vertical ground reaction force", _peak_vertical_force, section=FORCE,
               part="stance", shown=False),
@@ -241,6 +268,15 @@ REGISTRY: tuple[Measure, ...] = (
               lambda s, side: s.ankle_profile(side)[:, 1].max(), "peak, *", section=ANKLE,
               part="stance", kept=False),
     *_extensor_measures(),
+    *per_side("peak_shin_force_*", "cuff on the shin, *", "N",
+              "largest force of the cuff on the front of the leg, as the orthosis resists "
+              "dorsiflexion: its torque over the height of the cuff",
+              partial(_cuff_force, sign=1.0), section=LOADS),
+    *per_side("peak_calf_force_*", "cuff on the calf, *", "N",
+              "largest force of the cuff on the calf, as the orthosis resists plantarflexion",
+              partial(_cuff_force, sign=-1.0), section=LOADS),
+    *per_side("peak_cuff_pressure_*", "pressure under the cuff, *", "Pa",
+              "the larger of both over the area of the cuff", _cuff_pressure, section=LOADS),
     *per_side("dorsiflexion_stiffness_*", "K_D *", "N m/rad", "K_D; `null` when barefoot",
               partial(_stiffness, first=0), "K_D, *", "K_D *", section=EFFORT),
     *per_side("plantarflexion_stiffness_*", "K_P *", "N m/rad", "K_P; `null` when barefoot",

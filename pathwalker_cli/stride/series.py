@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pathwalker_cli.conventions import SIDES
-from pathwalker_cli.model.contact import FORCES, phase_named
+from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.model.elements.muscle import excitation_from_rate
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
@@ -33,7 +33,7 @@ class Sampled:
 
     @cached_property
     def contact_position(self) -> np.ndarray:
-        """Positions of the contact points, x and z [m], shape (n, 4, 2)."""
+        """Where the places of the pattern touch the ground, or would: x and z [m], (n, k, 2)."""
         return np.array([self.walker.contact_points(q) for q in self.q])
 
     def column(self, coordinate: str) -> np.ndarray:
@@ -55,7 +55,8 @@ class GaitSeries(Sampled):
         vdot: Generalised accelerations, shape (n, 10).
         activation: Activations, shape (n, 14).
         activation_rate: Their rates [1/s], shape (n, 14).
-        force: Ground reaction forces on the body [N], shape (n, 8); zero without contact.
+        force: Ground reaction forces on the body in the order of `walker.pattern.forces` [N],
+            shape (n, 8); zero without contact.
         reserve: Reserve forces [N, N m], shape (n, 10); zero in every accepted solution.
         element_force: Forces of all elements [N m] in the order of `walker.elements`, (n, k).
     """
@@ -139,7 +140,8 @@ class GaitSeries(Sampled):
         return self._foot_force(side, "x")
 
     def _foot_force(self, side: str, axis: str) -> np.ndarray:
-        rows = [i for i, f in enumerate(FORCES) if f.point.side == side and f.axis == axis]
+        forces = self.walker.pattern.forces
+        rows = [i for i, f in enumerate(forces) if f.point.side == side and f.axis == axis]
         return np.asarray(self.force[:, rows].sum(axis=1))
 
 
@@ -172,10 +174,10 @@ def _phase_series(walker: Walker, phase: PhaseMotion) -> dict[str, np.ndarray]:
     """Return the columns of one phase at its collocation points."""
     fractions = phase.point_fractions.ravel()
     n, count = walker.skeleton.size, fractions.size
-    active = list(phase_named(phase.name).indices)
+    active = walker.pattern.indices(phase_named(phase.name))
     states = phase.inner_states.reshape(count, -1)
     algebraic = phase.algebraic.reshape(count, -1)
-    force = np.zeros((count, len(FORCES)))
+    force = np.zeros((count, len(walker.pattern.forces)))
     force[:, active] = algebraic[:, n : n + len(active)]
     return {
         "time": phase.duration * fractions,

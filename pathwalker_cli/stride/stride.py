@@ -11,9 +11,9 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import trapezoid
 
-from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES, GENERATORS, SIDES, SUFFIX, Side
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
+from pathwalker_cli.model.contact import ContactPattern, phase_named
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.stride.series import GaitSeries, Sampled
@@ -27,11 +27,6 @@ friction ratio are quotients of two small numbers; force plates are evaluated wi
 
 Part = Literal["recording", "stride", "stance", "step"]
 """What of a walk one value of a measure belongs to."""
-
-_STRIKE: Final[dict[Side, str]] = {"right": "left_toe_right_heel", "left": "right_toe_left_heel"}
-"""Phase that begins with the foot strike of a side."""
-_TOE_OFF: Final[dict[Side, str]] = {"right": "left_flat", "left": "right_flat"}
-"""Phase that begins with the toe-off of a side."""
 
 
 class NotKnownError(LookupError):
@@ -59,7 +54,7 @@ class Stride(Sampled):
         phase: Name of the phase at each instant, n of them; empty where no phases are known.
         v: Generalised velocities [m/s, rad/s], shape (n, 10).
         force: Per side, ground reaction force on the foot (forward, up) [N], shape (n, 2).
-        point_force: Forces on the contact points [N], shape (n, 8).
+        point_force: Forces in the order of `walker.pattern.forces` [N], shape (n, 8).
         net_torque: Sum of muscle and orthosis torques per coordinate [N m], shape (n, 10).
         muscle_torque: Torque of each generator [N m], shape (n, 14).
         orthosis_torque: Torques of the orthoses right, left [N m], shape (n, 2).
@@ -67,12 +62,12 @@ class Stride(Sampled):
         activation: Activation of each generator, shape (n, 14).
         quadrature: Weights of an integral over time [s], shape (n,); trapezoids if left out.
         stiffness: K_D right, left, K_P right, left [N m/rad], shape (4,).
-        phase_durations: Durations of the eight phases [s].
+        phase_durations: Durations of the phases by name [s].
         steps: Per side, length of a recorded step [m].
         notes: What to know about it, one sentence each.
 
     Raises:
-        ValueError: If shapes do not fit, time decreases or a phase is none of the eight.
+        ValueError: If shapes do not fit, time decreases or a phase is none of the pattern's.
     """
 
     name: str
@@ -102,14 +97,15 @@ class Stride(Sampled):
         """Check the shapes."""
         n, columns = self.time.size, {"muscle_torque": len(GENERATORS), "orthosis_torque": 2}
         columns |= dict.fromkeys(("q", "v", "net_torque"), len(COORDINATES))
-        columns |= {"activation": len(GENERATORS), "point_force": 2 * len(CONTACT_POINTS)}
+        pattern = self.walker.pattern
+        columns |= {"activation": len(GENERATORS), "point_force": len(pattern.forces)}
         checked = [(name, getattr(self, name), width) for name, width in columns.items()]
         checked += [(f"force {side}", values, 2) for side, values in self.force.items()]
         for name, values, width in checked:
             if values is not None and values.shape != (n, width):
                 raise ValueError(f"{name} has shape {values.shape}; allowed: {(n, width)}")
-        if self.phase and (len(self.phase) != n or not set(self.phase) <= set(PHASE_NAMES)):
-            raise ValueError(f"phase names {n} instants with: {', '.join(PHASE_NAMES)}")
+        if self.phase and (len(self.phase) != n or not set(self.phase) <= set(pattern.names)):
+            raise ValueError(f"phase names {n} instants with: {', '.join(pattern.names)}")
         if np.any(np.diff(self.time) < 0.0):
             raise ValueError("time must not decrease from row to row")
 
@@ -163,9 +159,10 @@ class Stride(Sampled):
         return self.stance(side)[1]
 
     def stands(self, side: Side) -> np.ndarray:
-        """Return whether heel or toe of a side is on the ground, shape (n,)."""
+        """Return whether anything of a foot is on the ground, shape (n,)."""
         if self.phase:
-            return np.asarray(contacts(self.phase)[:, point_rows(side)].any(axis=1))
+            rows = self.walker.pattern.rows(side)
+            return np.asarray(contacts(self.walker, self.phase)[:, rows].any(axis=1))
         strike, toe_off = self.stance(side)
         return np.asarray((strike <= self.time) & (self.time <= toe_off))
 
@@ -224,10 +221,13 @@ class Stride(Sampled):
             return self._heel("right", self.time[-1]) - middle
         return middle - self._heel("right", self.time[0])
 
+    def pose(self, time: float) -> np.ndarray:
+        """Return the generalised coordinates at an instant [s], shape (10,)."""
+        return self._at(self.q, np.array([time]))[0]
+
     def _heel(self, side: Side, time: float) -> float:
         """Return the forward position of a heel [m] at an instant [s]."""
-        pose = self._at(self.q, np.array([time]))[0]
-        return float(self.walker.contact_points(pose)[point_rows(side)[0], 0])
+        return float(self.walker.foot_points(self.pose(time))[2 * SIDES.index(side), 0])
 
     def _between(self, values: np.ndarray, first: float, last: float, points: int) -> np.ndarray:
         """Return columns at some instants, those after the end taken from the beginning."""
@@ -245,15 +245,16 @@ def stride_of(
     """Return the stride that the solver found.
 
     Raises:
-        DataError: If the motion is not one stride in the eight phases.
+        DataError: If the motion is not one stride in the phases of the walker's pattern.
     """
-    durations = np.diff(switching_times(series.motion))
+    pattern = series.walker.pattern
+    durations = np.diff(switching_times(pattern, series.motion))
     return Stride(
         name=name,
         walker=series.walker,
         time=series.time,
         q=series.q,
-        stances=phase_stances(durations),
+        stances=phase_stances(pattern, durations),
         problem=problem,
         phase=series.phase,
         v=series.v,
@@ -269,32 +270,34 @@ def stride_of(
         activation=series.activation,
         quadrature=series.quadrature,
         stiffness=series.stiffness if series.stiffness.size else None,
-        phase_durations=dict(zip(PHASE_NAMES, durations.tolist(), strict=True)),
+        phase_durations=dict(zip(pattern.names, durations.tolist(), strict=True)),
         notes=notes,
     )
 
 
-def switching_times(motion: PhasedMotion) -> np.ndarray:
-    """Return the beginnings of the eight phases and the end of the last one [s], shape (9,).
+def switching_times(pattern: ContactPattern, motion: PhasedMotion) -> np.ndarray:
+    """Return the beginnings of all phases and the end of the last one [s], shape (k + 1,).
 
     Raises:
-        DataError: If the motion is not one stride in the eight phases.
+        DataError: If the motion is not one stride in the phases of the pattern.
     """
     names = tuple(phase.name for phase in motion.phases)
-    if names != PHASE_NAMES:
+    if names != pattern.names:
         raise DataError(
             f"a motion of the phases {', '.join(names)} is no full stride",
-            allowed=", ".join(PHASE_NAMES),
+            allowed=", ".join(pattern.names),
         )
     return np.concatenate([[0.0], np.cumsum(motion.durations)])
 
 
-def phase_stances(durations: np.ndarray) -> dict[Side, tuple[float, float]]:
-    """Return foot strike and toe-off of each side [s] from the durations of the eight phases."""
+def phase_stances(
+    pattern: ContactPattern, durations: np.ndarray
+) -> dict[Side, tuple[float, float]]:
+    """Return foot strike and toe-off of each side [s] from the durations of the phases."""
     switching = np.concatenate([[0.0], np.cumsum(durations)])
     found: dict[Side, tuple[float, float]] = {}
     for side in SIDES:
-        strike, off = (switching[PHASE_NAMES.index(name[side])] for name in (_STRIKE, _TOE_OFF))
+        strike, off = switching[pattern.strike(side)], switching[pattern.toe_off(side)]
         found[side] = float(strike), float(off if off > strike else off + switching[-1])
     return found
 
@@ -321,7 +324,8 @@ class OwnCycle:
 def own_cycle(series: GaitSeries, side: Side) -> OwnCycle:
     """Return the gait cycle of a side."""
     duration, time = series.duration, series.time
-    strike, toe_off = phase_stances(np.diff(switching_times(series.motion)))[side]
+    pattern = series.walker.pattern
+    strike, toe_off = phase_stances(pattern, np.diff(switching_times(pattern, series.motion)))[side]
     first = int(np.argmin(np.abs(time - strike)))
     index = np.concatenate([np.arange(first, time.size), np.arange(first + 1)])
     later = np.repeat([0.0, duration], [time.size - first, first + 1])
@@ -329,20 +333,17 @@ def own_cycle(series: GaitSeries, side: Side) -> OwnCycle:
     return OwnCycle(side, index, percent, 100.0 * ((toe_off - strike) % duration) / duration)
 
 
-def point_rows(side: Side) -> list[int]:
-    """Return the positions of heel and toe of a side in `conventions.CONTACT_POINTS`."""
-    return [CONTACT_POINTS.index(f"{point}_{SUFFIX[side]}") for point in ("heel", "toe")]
+def contacts(walker: Walker, phase: tuple[str, ...]) -> np.ndarray:
+    """Return whether each place of the pattern is on the ground in each of n phases, (n, k)."""
+    points = {name: phase_named(name).points for name in set(phase)}
+    return np.array([[point in points[name] for point in walker.pattern.points] for name in phase])
 
 
-def contacts(phase: tuple[str, ...]) -> np.ndarray:
-    """Return whether each contact point is on the ground in each of n phases, shape (n, 4)."""
-    points = {name: {p.name for p in phase_named(name).points} for name in set(phase)}
-    return np.array([[p in points[name] for p in CONTACT_POINTS] for name in phase])
-
-
-def toe_bearing(phase: tuple[str, ...], side: Side) -> np.ndarray:
-    """Return whether a foot stands flat or on its toe in each of n phases, shape (n,)."""
-    return np.asarray(contacts(phase)[:, point_rows(side)[1]])
+def toe_bearing(walker: Walker, phase: tuple[str, ...], side: Side) -> np.ndarray:
+    """Return whether a foot stands on more than its heel in each of n phases, shape (n,)."""
+    points = walker.pattern.points
+    rows = [i for i in walker.pattern.rows(side) if points[i].place != "heel"]
+    return np.asarray(contacts(walker, phase)[:, rows].any(axis=1))
 
 
 def loaded(series: GaitSeries, side: Side) -> np.ndarray:
@@ -355,7 +356,7 @@ def centre_of_pressure(series: GaitSeries, side: Side) -> np.ndarray:
 
     NaN where the foot is not loaded.
     """
-    rows, bearing = point_rows(side), loaded(series, side)
+    rows, bearing = series.walker.pattern.rows(side), loaded(series, side)
     force = series.force[:, [2 * row + 1 for row in rows]]
     moment = (force * series.contact_position[:, rows, 0]).sum(axis=1)
     centre = np.full(series.time.size, np.nan)

@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
 
-from pathwalker_cli.model.contact import POINTS
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.taped import Columns
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
+from pathwalker_cli.stride.ground import touched
 from pathwalker_cli.stride.series import GaitSeries
 
 
@@ -113,11 +113,11 @@ def second_engine_residual(series: GaitSeries) -> float:
         needed = pin.rnea(model, data, q, np.array(series.v[k]), np.array(series.vdot[k]))
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
-        for i, point in enumerate(POINTS):
-            jacobian = pin.getFrameJacobian(
-                model, data, model.getFrameId(point.name), pin.LOCAL_WORLD_ALIGNED
-            )
-            needed = needed - jacobian[[0, 2]].T @ series.force[k, 2 * i : 2 * i + 2]
+        for place, force in zip(touched(walker, data), series.force[k].reshape(-1, 2), strict=True):
+            jacobian = pin.getFrameJacobian(model, data, place.frame, pin.LOCAL_WORLD_ALIGNED)
+            forward, _, upward = place.arm
+            rows = jacobian[[0, 2]] + np.outer((upward, -forward), jacobian[4])
+            needed = needed - rows.T @ force
         worst = max(worst, float(np.abs(needed - given[k]).max()))
     return worst
 
@@ -125,7 +125,8 @@ def second_engine_residual(series: GaitSeries) -> float:
 def equation_residual(series: GaitSeries, walker: Walker) -> float:
     """Return how far a walker's own back end misses the equations of motion at most [N, N m]."""
     body, n = walker.rigid_body, walker.skeleton.size
-    q, v, vdot, force = (ca.SX.sym(name, k) for name, k in (("q", n), ("v", n), ("a", n), ("f", 8)))
+    sizes = {"q": n, "v": n, "vdot": n, "force": len(walker.pattern.forces)}
+    q, v, vdot, force = (ca.SX.sym(name, k) for name, k in sizes.items())
     theta = ca.DM(body.parameters)
     balance = body.inverse_dynamics(q, v, vdot, theta) - body.point_jacobian(q, theta).T @ force
     needed = ca.Function("needed", [q, v, vdot, force], [balance]).map(len(series.time))

@@ -183,7 +183,7 @@ def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[
         )
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
-        made["goals"] = goal_values(run.motion, solver.walker.weight, ranges)
+        made["goals"] = goal_values(run.motion, solver.walker, ranges)
     pairs = ((".".join(key), _apart(_at(metrics, key), value)) for key, value in _flat(made))
     yield _largest("metrics.json", pairs)
 

@@ -23,6 +23,7 @@ from pathwalker_cli.model.backends.functions import (
     Topology,
     all_parameters,
     fold,
+    touching,
 )
 
 _MODULES = MappingProxyType({"pinocchio.casadi": bindings, "compiled": compiled, "direct": direct})
@@ -58,7 +59,11 @@ def available_backends() -> tuple[str, ...]:
 
 
 def rigid_body_functions(
-    model: pin.Model, points: Sequence[str], backend: str = "auto"
+    model: pin.Model,
+    points: Sequence[str],
+    backend: str = "auto",
+    shapes: Sequence[float] = (),
+    soles: bool = False,
 ) -> RigidBodyFunctions:
     """Build the symbolic dynamics and kinematics of a planar model.
 
@@ -69,6 +74,8 @@ def rigid_body_functions(
         model: Model in the x-z plane of revolute and prismatic joints along the axes.
         points: Names of the frames whose motion is wanted, e.g. contact points.
         backend: One of `BACKENDS`, or "auto" for the first one available.
+        shapes: Radius of the circle of each point [m], then roundness of each sole; none: points.
+        soles: Whether the points of one body are the ends of a sole, see `functions.touching`.
 
     Raises:
         BackendError: The back end does not exist or cannot be used here, or the model has joints
@@ -78,8 +85,8 @@ def rigid_body_functions(
     if name not in BACKENDS:
         allowed = ", ".join(("auto", *available_backends()))
         raise BackendError(f"there is no back end {name!r}; available: {allowed}")
-    topology = Topology.of(model, points)
-    parameters = all_parameters(model, points)
+    topology = Topology.of(model, points, soles)
+    parameters = all_parameters(model, points, shapes)
     nonzero = tuple((parameters != 0.0).tolist())
     values = parameters[np.array(nonzero, dtype=bool)]
     values.setflags(write=False)
@@ -104,7 +111,8 @@ def _folded(
         raise BackendError(
             f"back end {name!r} is not available: {report.detail}; or use one of auto, {others}"
         )
-    return MappingProxyType(fold(topology, _MODULES[name].build(topology), nonzero))
+    full = touching(topology, _MODULES[name].build(topology))
+    return MappingProxyType(fold(topology, full, nonzero))
 
 
 def _report(name: str) -> BackendReport:

@@ -39,10 +39,10 @@ def describe() -> str:
 
 
 def build(topology: Topology) -> dict[str, ca.Function]:
-    """Return the functions of `SIGNATURES` for all parameters of a topology."""
+    """Return the functions of `SIGNATURES` for the bodies and fixed points of a topology."""
     nq = len(topology.joints)
     symbols = {name: ca.SX.sym(name, nq) for name in ("q", "v", "vdot")}
-    symbols["theta"] = ca.SX.sym("theta", len(topology.parameter_names))
+    symbols["theta"] = ca.SX.sym("theta", len(topology.body_names))
     expressions = evaluate(bindings(), topology, **symbols)
     return {
         name: ca.Function(name, [symbols[argument] for argument in arguments], [expressions[name]])
@@ -56,7 +56,7 @@ def evaluate(
     """Return the values of the functions of `SIGNATURES` by name, by Pinocchio's own algorithms.
 
     `module` is `pinocchio.casadi` for SX, `pinocchio` for numbers; `theta` holds all parameters, as
-    in `Topology.parameter_names`; units are those of `RigidBodyFunctions`.
+    in `Topology.body_names`; units are those of `RigidBodyFunctions`.
     """
     model = _model(module, topology, theta)
     data = model.createData()

@@ -17,7 +17,7 @@ _REINSTALL = "install pathwalker-cli again, with a C++ compiler at hand"
 
 
 def build(topology: Topology) -> dict[str, ca.Function]:
-    """Return the functions of `SIGNATURES` for all parameters of a topology."""
+    """Return the functions of `SIGNATURES` for the bodies and fixed points of a topology."""
     n_joints, n_points = len(topology.joints), len(topology.points)
     rotations = [entry for rotation in topology.rotations for entry in rotation]
     text = ctypes.c_char_p()

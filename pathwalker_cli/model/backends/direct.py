@@ -55,7 +55,7 @@ def describe() -> str:
 
 
 def build(topology: Topology) -> dict[str, ca.Function]:
-    """Return the functions of `SIGNATURES` for all parameters of a topology."""
+    """Return the functions of `SIGNATURES` for the bodies and fixed points of a topology."""
     nq = len(topology.joints)
     q, v, vdot = (ca.SX.sym(name, nq) for name in ("q", "v", "vdot"))
     n_joint, n_point = nq * len(JOINT_ENTRIES), len(topology.points) * len(POINT_ENTRIES)

@@ -47,6 +47,10 @@ of mass [m] and inertia about it [kg m^2] of the body it moves, in the axes of t
 POINT_ENTRIES = tuple(f"position.{axis}" for axis in "xyz")
 """Parameters of a point, in order: its position in the frame of its joint [m]."""
 
+RADIUS, ROUNDNESS = "radius", "roundness"
+"""What stands behind the parameters of all joints and points: radius of the circle of every point
+[m], and the roundness of every sole [-]; see `touching`."""
+
 
 @dataclass(frozen=True)
 class Topology:
@@ -60,6 +64,7 @@ class Topology:
         points: Names of the point frames.
         point_joints: Number of the joint that carries each point.
         gravity: Gravitational acceleration in world axes [m/s^2].
+        soles: Whether the points of one body are the ends of a sole: one contact, not several.
     """
 
     joints: tuple[str, ...]
@@ -69,14 +74,16 @@ class Topology:
     points: tuple[str, ...]
     point_joints: tuple[int, ...]
     gravity: tuple[float, float, float]
+    soles: bool = False
 
     @classmethod
-    def of(cls, model: pin.Model, points: Sequence[str]) -> Topology:
+    def of(cls, model: pin.Model, points: Sequence[str], soles: bool = False) -> Topology:
         """Read the topology of a model.
 
         Args:
             model: Model whose joints are all of `JOINT_TYPES`.
             points: Names of frames of the model.
+            soles: Whether the points of one body are the ends of a sole.
 
         Raises:
             BackendError: A joint is of another type, a point is no frame of the model, or the
@@ -101,14 +108,44 @@ class Topology:
             points=tuple(points),
             point_joints=tuple(_frame(model, point).parentJoint for point in points),
             gravity=tuple(model.gravity.linear.tolist()),
+            soles=soles,
         )
 
     @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Names of all parameters in order, e.g. "hip_r.placement.z" or "heel_r.position.x"."""
+    def contacts(self) -> tuple[tuple[int, ...], ...]:
+        """Numbers of the points that make each contact: every one, or those of one body."""
+        if not self.soles:
+            return tuple((i,) for i in range(len(self.points)))
+        bodies = dict.fromkeys(self.point_joints)
+        return tuple(
+            tuple(i for i, joint in enumerate(self.point_joints) if joint == body)
+            for body in bodies
+        )
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the parameters that a back end knows, e.g. "hip_r.mass", "heel_r.position.x"."""
         of_joints = (f"{joint}.{entry}" for joint in self.joints for entry in JOINT_ENTRIES)
         of_points = (f"{point}.{entry}" for point in self.points for entry in POINT_ENTRIES)
         return (*of_joints, *of_points)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of all parameters in order: `body_names`, then e.g. "heel_r.radius"."""
+        radii = (f"{point}.{RADIUS}" for point in self.points)
+        bodies = (self.joints[self.point_joints[group[0]] - 1] for group in self.contacts)
+        rounded = tuple(f"{body}.{ROUNDNESS}" for body in bodies) if self.soles else ()
+        return (*self.body_names, *radii, *rounded)
+
+    @property
+    def turns(self) -> np.ndarray:
+        """Which hinges about y turn the body of each point: entries 0 and 1, shape (n, nq)."""
+        matrix = np.zeros((len(self.points), len(self.joints)))
+        for row, joint in zip(matrix, self.point_joints, strict=True):
+            while joint:
+                row[joint - 1] = self.types[joint - 1] == "RY"
+                joint = self.parents[joint - 1]
+        return matrix
 
     @property
     def n_root_translations(self) -> int:
@@ -121,8 +158,13 @@ class Topology:
         return count
 
 
-def all_parameters(model: pin.Model, points: Sequence[str]) -> np.ndarray:
-    """Return the values of `Topology.parameter_names`, zeros included."""
+def all_parameters(
+    model: pin.Model, points: Sequence[str], shapes: Sequence[float] = ()
+) -> np.ndarray:
+    """Return the values of `Topology.parameter_names`, zeros included.
+
+    `shapes` are radii [m] and roundnesses [-] of the contacts; none: all are points.
+    """
     symmetric = ((0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2))
     values = [
         np.concatenate(
@@ -131,7 +173,7 @@ def all_parameters(model: pin.Model, points: Sequence[str]) -> np.ndarray:
         for placement, body in zip(model.jointPlacements[1:], model.inertias[1:], strict=True)
     ]
     values += [_frame(model, point).placement.translation for point in points]
-    return np.concatenate(values)
+    return np.concatenate([*values, shapes if len(shapes) else np.zeros(len(points))])
 
 
 def _frame(model: pin.Model, name: str) -> pin.Frame:
@@ -147,7 +189,7 @@ class RigidBodyFunctions:
 
     Arguments are generalised coordinates `q` [m, rad], velocities `v` [m/s, rad/s], accelerations
     `vdot` [m/s^2, rad/s^2], each of shape (nq,), and model parameters `theta`.  Quantities of
-    points are in world axes, x and z per point, stacked: shape (2 n,).
+    points are those of contacts, see `touching`, in world axes, x and z each, stacked: (2 n,).
 
     Attributes:
         backend: Name of the back end that built the functions.
@@ -155,10 +197,10 @@ class RigidBodyFunctions:
         inverse_dynamics: (q, v, vdot, theta) -> generalised forces [N, N m], shape (nq,).
         mass_matrix: (q, theta) -> mass matrix [kg, kg m, kg m^2], shape (nq, nq).
         bias: (q, v, theta) -> Coriolis, centrifugal and gravity forces [N, N m], shape (nq,).
-        point_positions: (q, theta) -> positions of the points [m].
-        point_velocities: (q, v, theta) -> velocities of the points [m/s].
+        point_positions: (q, theta) -> where the contacts touch level ground, or would [m].
+        point_velocities: (q, v, theta) -> velocities of the bodies there [m/s].
         point_accelerations: (q, v, vdot, theta) -> their time derivative [m/s^2], without gravity.
-        point_jacobian: (q, theta) -> derivative of the positions by q, shape (2 n, nq).
+        point_jacobian: (q, theta) -> derivative of these velocities by v, shape (2 n, nq).
         centre_of_mass: (q, theta) -> centre of mass [m], shape (3,).
         parameters: Values of `theta` of the model they were built from.
         parameter_names: Names of the entries of `theta`, e.g. "hip_r.mass".
@@ -179,34 +221,40 @@ class RigidBodyFunctions:
     parameter_names: tuple[str, ...]
     topology: Topology
 
-    def parameters_for(self, model: pin.Model) -> np.ndarray:
-        """Return the values of `theta` for another model of the same topology.
+    def parameters_for(self, model: pin.Model, shapes: Sequence[float] = ()) -> np.ndarray:
+        """Return the values of `theta` for another model of the same topology, with these shapes.
 
         Raises:
             BackendError: The topology differs, or the model needs an entry that is folded away.
         """
-        if Topology.of(model, self.topology.points) != self.topology:
+        if Topology.of(model, self.topology.points, self.topology.soles) != self.topology:
             raise BackendError(
                 "the model has other joints, parents, rotations or gravity than the one the "
                 "functions were built from; build functions for it with rigid_body_functions()"
             )
-        return parameters_of(model, self.topology.points, self.parameter_names)
+        return parameters_of(model, self.topology, self.parameter_names, shapes)
 
 
-def parameters_of(model: pin.Model, points: Sequence[str], names: Sequence[str]) -> np.ndarray:
+def parameters_of(
+    model: pin.Model,
+    topology: Topology,
+    names: Sequence[str],
+    shapes: Sequence[float] = (),
+) -> np.ndarray:
     """Return the named parameters of a model, shape (len(names),), read-only.
 
     Args:
         model: Model of the topology the names were made for.
-        points: Names of the point frames.
+        topology: Topology of the model.
         names: Names of parameters, see `RigidBodyFunctions.parameter_names`.
+        shapes: Radii and roundnesses, see `all_parameters`.
 
     Raises:
         BackendError: A name does not exist, or a parameter that is not named is not zero: the
             functions that go with the names take it for zero.
     """
-    known = Topology.of(model, points).parameter_names
-    values = dict(zip(known, all_parameters(model, points).tolist(), strict=True))
+    every = all_parameters(model, topology.points, shapes)
+    values = dict(zip(topology.parameter_names, every.tolist(), strict=True))
     if unknown := [name for name in names if name not in values]:
         raise BackendError(f"the model has no parameter {', '.join(unknown)}")
     named = set(names)
@@ -218,6 +266,71 @@ def parameters_of(model: pin.Model, points: Sequence[str], names: Sequence[str])
     result = np.array([values[name] for name in names])
     result.setflags(write=False)
     return result
+
+
+def touching(topology: Topology, fixed: Mapping[str, ca.Function]) -> dict[str, ca.Function]:
+    """Let the feet touch level ground with round bodies instead of fixed points.
+
+    Every point carries a circle that touches level ground there where the body has not turned: its
+    lowest point stands r (sin t, cos t - 1) from the point when the body has turned by t about +y.
+    Under a sole the lowest points z_i of its circles blend to one,
+    z = mean(z_i) - log(mean(exp(-k (z_i - mean(z_i))))) / k, at the mean place with these weights:
+    one convex body that may roll from its rear to its front end.  With k = 4 c / L its radius is
+    L c + r where it lies flat, L the distance of its ends and c its roundness; with c = infinity
+    it is flat.  A contact rolls without slipping while the point of the body that touches the
+    ground stands still; its velocity, not that of the moving place, is the contact's.
+
+    Args:
+        topology: Topology of the model; frames of joints are parallel where all angles are 0.
+        fixed: The functions of `SIGNATURES` with `theta` as in `Topology.body_names`, of points.
+
+    Returns:
+        The same of contacts, with `theta` as in `Topology.parameter_names`.
+    """
+    nq, count, n = len(topology.joints), len(topology.body_names), len(topology.points)
+    symbols = {name: ca.SX.sym(name, nq) for name in ("q", "v", "vdot")}
+    symbols["theta"] = theta = ca.SX.sym("theta", len(topology.parameter_names))
+    body = {**symbols, "theta": theta[:count]}
+    values = {name: fixed[name](*(body[a] for a in given)) for name, given in SIGNATURES.items()}
+    radius, roundness = theta[count : count + n], theta[count + n :]
+    turns = ca.SX(ca.sparsify(ca.DM(topology.turns)))
+    turn = turns @ symbols["q"]
+    low = [radius[i] * ca.vertcat(ca.sin(turn[i]), ca.cos(turn[i]) - 1.0) for i in range(n)]
+    places = ca.reshape(values["point_positions"], 2, n)
+    at = len(topology.joints) * len(JOINT_ENTRIES)
+    ends = ca.reshape(theta[at:count], len(POINT_ENTRIES), n)
+    rows: dict[str, list[ca.SX]] = {name: [] for name in values if name.startswith("point")}
+    for number, group in enumerate(topology.contacts):
+        first, spin, shift = group[0], turns[group[0], :], low[group[0]]
+        if topology.soles:
+            length = ca.norm_2(ends[:, group[-1]] - ends[:, first])
+            touched = ca.horzcat(*(places[:, i] + low[i] - places[:, first] for i in group))
+            shift = _blended(touched, 4.0 * roundness[number] / length)
+        arm, turned = ca.vertcat(shift[1], -shift[0]), ca.jtimes(shift, symbols["q"], symbols["v"])
+        speed, change = spin @ symbols["v"], spin @ symbols["vdot"]
+        moved = {
+            "point_positions": shift,
+            "point_velocities": arm * speed,
+            "point_accelerations": arm * change + ca.vertcat(turned[1], -turned[0]) * speed,
+            "point_jacobian": arm @ spin,
+        }
+        for name, more in moved.items():
+            rows[name].append(values[name][2 * first : 2 * first + 2, :] + more)
+    values |= {name: ca.vertcat(*each) for name, each in rows.items() if each}
+    return {
+        name: ca.Function(name, [symbols[argument] for argument in given], [values[name]])
+        for name, given in SIGNATURES.items()
+    }
+
+
+def _blended(places: ca.SX, sharpness: ca.SX) -> ca.SX:
+    """Return the lowest point of a sole under some of its points, both (x, z), shape (2, k)."""
+    heights = places[1, :]
+    middle = ca.sum2(heights) / heights.numel()
+    shares = ca.exp(-sharpness * (heights - middle))
+    total = ca.sum2(shares)
+    forward = ca.dot(places[0, :], shares) / total
+    return ca.vertcat(forward, middle - ca.log(total / heights.numel()) / sharpness)
 
 
 def fold(

@@ -92,7 +92,8 @@ def _draw_profile(ax: Axes, series: GaitSeries, side: Side) -> None:
     name = f"ankle_{SUFFIX[side]}"
     angle = -series.column(name)
     torque = series.net_torque[:, COORDINATES.index(name)]
-    bearing, look = toe_bearing(series.phase, side), style.side_line(side)
+    bearing = toe_bearing(series.walker, series.phase, side)
+    look = style.side_line(side)
     slope, offset = ankle_torque_line(stride_of(series), side)
     style.zero_line(ax)
     ax.plot(to_degrees(angle), torque, linewidth=0.6, **look)

@@ -1,0 +1,101 @@
+"""What walkers are made of: force elements, device and feet, before any patient's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+from pathwalker_cli.conventions import Condition
+from pathwalker_cli.model.contact import POINTS, Contact, ContactPattern, Feet, contact_pattern
+from pathwalker_cli.model.devices import DEVICES, Device
+from pathwalker_cli.model.elements import ForceElement
+from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
+from pathwalker_cli.model.elements.tissue import leg_tissue
+from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at
+
+_MUSCLES: Final = generators()
+_TISSUE: Final = leg_tissue()
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Which parts a walker has.
+
+    Args:
+        condition: "barefoot" or "orthosis".
+        tissue: Whether joints have passive torques.
+        feet: What the feet touch the ground with.
+        contact: How right and left foot are used; a sole needs to know nothing of it.
+    """
+
+    condition: Condition = "barefoot"
+    tissue: bool = False
+    feet: Feet = "points"
+    contact: Contact = ("heel_toe", "heel_toe")
+
+    @property
+    def pattern(self) -> ContactPattern:
+        """The order in which places of the feet stand on the ground."""
+        return contact_pattern(self.feet, self.contact)
+
+    @property
+    def device(self) -> Device:
+        """What the patient walks with."""
+        return DEVICES[self.condition]
+
+    @property
+    def muscles(self) -> tuple[MuscleTorqueGenerator, ...]:
+        """The muscle torque generators."""
+        return _MUSCLES
+
+    @property
+    def passive(self) -> tuple[ForceElement, ...]:
+        """Force elements of the body beside the muscles."""
+        return _TISSUE if self.tissue else ()
+
+    @cached_property
+    def elements(self) -> tuple[ForceElement, ...]:
+        """All force elements: muscles, other tissue, then what the device adds."""
+        return (*self.muscles, *self.passive, *self.device.forces)
+
+    @cached_property
+    def shapes(self) -> tuple[Number, ...]:
+        """Radii of the circles in the order of `POINTS`, roundness of the soles; none of points."""
+        if self.feet == "points":
+            return ()
+        round_soles = self.pattern.points if self.feet == "sole" else ()
+        return tuple(point.shape for point in (*POINTS, *round_soles))
+
+    @cached_property
+    def body_numbers(self) -> tuple[Number, ...]:
+        """The numbers that enter the rigid bodies and their contacts, all of them linearly."""
+        return (*self.device.added_mass.values(), *self.shapes)
+
+    @cached_property
+    def numbers(self) -> tuple[Number, ...]:
+        """Every named number: of the elements, then of the bodies."""
+        return (*(n for element in self.elements for n in element.numbers), *self.body_numbers)
+
+    def unknowns(self, free: Sequence[str] = ()) -> tuple[Unknown, ...]:
+        """Return what a problem chooses: what is asked for, and what a device is identified by.
+
+        What a device is identified for stands first, per kind right before left, unless both sides
+        alike are asked for.
+
+        Args:
+            free: Addresses of numbers that are asked for.
+
+        Raises:
+            ConfigError: If there is no such number.
+        """
+        asked = unknowns_at(free, self.numbers)
+        taken = {address for unknown in asked for address in unknown.addresses}
+        usual = [
+            Unknown.of(number)
+            for name in self.device.identified
+            for number in self.numbers
+            if number.name == name and number.address not in taken
+        ]
+        return (*usual, *asked)
