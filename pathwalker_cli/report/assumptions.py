@@ -12,6 +12,7 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.config.learnt import config_values
 from pathwalker_cli.config.values import changed_values, value_text
 from pathwalker_cli.conventions import LEG_JOINTS, SUFFIX
+from pathwalker_cli.model.contact import Feet
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.report.content import Section, fact_table
 from pathwalker_cli.report.runs import ReportRun
@@ -22,6 +23,10 @@ _METHODS: Final = {
     "collocation": "direct collocation",
     "multiple-shooting": "direct multiple shooting",
 }
+_FEET: Final[dict[Feet, str]] = {
+    "points": "a heel and a toe point", "rockers": "circles at heel and toe that roll",
+    "sole": "one convex sole that rolls",
+}  # fmt: skip
 _JOINT: Final = re.compile(rf"\b({'|'.join(LEG_JOINTS)})_([rl])\b")
 _TWO_FEET: Final = re.compile(r"\b(right|left)_(toe|flat)_(right|left)_(heel|flat)\b")
 _SIDE: Final = {suffix: side for side, suffix in SUFFIX.items()}
@@ -61,8 +66,8 @@ def _facts(run: ReportRun) -> dict[str, str]:
     mesh, solver = config.mesh, config.solver
     quirks = ", with the quirks of the published model" if result.published_model else ""
     return {
-        "Model": "flat rigid-body walker with 14 muscle torque generators, two contact points per "
-        "foot; dynamics back end "
+        "Model": "flat rigid-body walker with 14 muscle torque generators; feet: "
+        f"{_FEET[config.model.feet]}; dynamics back end "
         f"{_text(result.dynamics_backend)}{quirks}; assumed aim: {_aim(config)}",
         "Mass, strengths": ". ".join([
             f"body mass {run.patient.body_mass:g} kg and strengths from the patient's file",

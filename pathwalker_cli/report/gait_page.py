@@ -32,7 +32,7 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
         Fact("Height", f"{patient.height:g} m"),
         *_of_runs(runs),
     )
-    named = ", ".join(run.label for run in runs)
+    named = ", ".join({"orthosis": "with orthoses"}.get(run.label, run.label) for run in runs)
     title = f"Gait of {patient.id}: {named}"
     return Page(title, facts, answer(runs, found), tuple(_warnings(runs)), tuple(sections))
 

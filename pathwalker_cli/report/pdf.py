@@ -165,7 +165,7 @@ class _Sheet(FPDF):
         natural = []
         for i, (kind, head) in enumerate(zip(table.columns, table.head, strict=True)):
             cells = [] if kind == "p" else [row[i] for row in whole]
-            bold = [*head.split(" "), *(cells if i == _GOOD else ())]
+            bold = [*self._known(head).split(" "), *(cells if i == _GOOD else ())]
             widest = max(self._width("B", bold), self._width("", cells))
             natural.append(widest + 2.0 * _CELL + 0.5)
         prose = [i for i, kind in enumerate(table.columns) if kind == "p"]

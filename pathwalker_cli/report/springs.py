@@ -51,7 +51,8 @@ def spring_section(run: ReportRun) -> Section:
     else:
         facts = tuple(_facts(verdict))
     table = Table(_HEAD, rows, notes=tuple(notes), columns="wwnnp")
-    return Section(f"Springs to fit, {run.label}", lines, facts, (table,))
+    named = "" if run.label == run.run.config.condition else f", {run.label}"
+    return Section(f"Springs to fit{named}", lines, facts, (table,))
 
 
 def recommended(run: ReportRun) -> dict[str, float]:

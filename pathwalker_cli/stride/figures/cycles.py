@@ -23,7 +23,7 @@ from pathwalker_cli.stride.figures.curves import (
     Reference,
 )
 from pathwalker_cli.stride.series import GaitSeries
-from pathwalker_cli.stride.stride import Stride, contacts, own_cycle, point_rows, stride_of
+from pathwalker_cli.stride.stride import Stride, contacts, own_cycle, stride_of
 
 _ANGLES: Final = {"pelvis_tilt_*": "Pelvis", "hip_*": "Hip", "knee_*": "Knee", "ankle_*": "Ankle",
                   "lumbar_*": "Trunk against pelvis"}  # fmt: skip
@@ -83,10 +83,10 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
 
 def support_changes(stride: Stride, side: Side) -> np.ndarray:
     """Return where a heel or toe of a foot meets or leaves the ground in its own cycle [%]."""
-    rows, own = np.cumsum([*stride.phase_durations.values()]), contacts((*stride.phase_durations,))
-    feet = own[:, point_rows(side)]
-    changed = (feet != np.roll(feet, -1, axis=0)).any(axis=1)
-    later = (rows[changed] - stride.strike(side)) % stride.duration
+    walker, ends = stride.walker, np.cumsum([*stride.phase_durations.values()])
+    foot = contacts(walker, (*stride.phase_durations,))[:, walker.pattern.rows(side)]
+    changed = (foot != np.roll(foot, -1, axis=0)).any(axis=1)
+    later = (ends[changed] - stride.strike(side)) % stride.duration
     return np.sort(100.0 * later / stride.duration)
 
 
