@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pathwalker_cli.inverse.forces import centre_of_pressure
 from pathwalker_cli.io.c3d import Recording, read_c3d
+from pathwalker_cli.io.c3d_plates import centre_of_pressure
 
 ezc3d = pytest.importorskip("ezc3d")
 

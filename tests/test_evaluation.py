@@ -23,6 +23,7 @@ from pathwalker_cli.evaluation.differences import (
     rms_one_trial,
 )
 from pathwalker_cli.evaluation.evaluate import Evaluation, compared, evaluate_gait, gait_changes
+from pathwalker_cli.evaluation.norms import PROFILE
 from pathwalker_cli.evaluation.paper import paper_number
 from pathwalker_cli.evaluation.recorded import (
     RecordedGait,
@@ -349,11 +350,7 @@ def test_every_quantity_has_a_row(condition: Condition) -> None:
     for key in (*FORCE_RMS, "step_length_left", "rms_mean_cycle_knee", "rms_one_trial_hip",
                 "peak_vertical_force_right", "ankle_torque_slope_stance_left"):  # fmt: skip
         assert evaluation.row(key).position in ("below", "in", "above")
-    assert not [
-        note
-        for note in evaluation.notes
-        if "typical children" not in note and "Profile Score" not in note
-    ]
+    assert not [note for note in evaluation.notes if "typical children" not in note]
     with pytest.raises(KeyError):
         evaluation.row("colour")
 
@@ -371,7 +368,8 @@ def test_the_article_stands_beside_its_own_patient_and_problem() -> None:
 def test_changes_are_differences_of_values_and_of_recorded_means() -> None:
     barefoot, orthosis = made_evaluation("barefoot"), made_evaluation("orthosis")
     changes = {change.measure.key: change for change in gait_changes(barefoot, orthosis)}
-    assert list(changes) == [m.key for m in measures_in("evaluate") if "stiffness" not in m.key]
+    every = (*measures_in("evaluate"), *PROFILE)
+    assert list(changes) == [m.key for m in every if "stiffness" not in m.key]
     knee = changes["min_stance_knee_flexion_right"]
     assert knee.value == knee.orthosis - knee.barefoot
     # The patient walked with straighter knees in the orthoses.
@@ -398,8 +396,8 @@ def test_recordings_without_forces_still_tell_of_angles() -> None:
     assert evaluation.row("rms_mean_cycle_knee").recorded is not None
     assert evaluation.row("peak_vertical_force_right").recorded is None
     assert all(row.value is None for row in evaluation.rows if row.measure.key in FORCE_RMS)
-    assert len(evaluation.notes) == 4
-    assert all("not compared" in note for note in evaluation.notes[2:])
+    assert len(evaluation.notes) == 3
+    assert all("not compared" in note for note in evaluation.notes[1:])
 
 
 def test_a_motion_without_torques_gives_what_it_has() -> None:

@@ -11,6 +11,7 @@ import pytest
 from pathwalker_cli.conventions import GENERATORS
 from pathwalker_cli.evaluation.differences import DIFFERENCES
 from pathwalker_cli.evaluation.evaluate import compared
+from pathwalker_cli.evaluation.norms import PROFILE
 from pathwalker_cli.evaluation.paper import (
     CLAIMS,
     NUMBERS,
@@ -108,7 +109,11 @@ def test_the_documentation_names_every_quantity_and_its_python_imports() -> None
     text = DOCUMENTATION.read_text(encoding="utf-8")
     named = {key for name in TABLES["evaluate"] for key in expanded(name)}
     shipped = [m for m in REGISTRY if m.key in named]  # what is added later is on a page of its own
-    for measure in (*(replace(m, key=m.compared_as or m.key) for m in shipped), *DIFFERENCES):
+    for measure in (
+        *(replace(m, key=m.compared_as or m.key) for m in shipped),
+        *DIFFERENCES,
+        *PROFILE,
+    ):
         stems = {measure.key, f"{measure.key.rpartition('_')[0]}_*"}
         assert any(f"`{stem}`" in text for stem in stems), measure.key
     code = text.partition("```python\n")[2].partition("```")[0]

@@ -32,11 +32,10 @@ from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.markers import load_marker_set
 from pathwalker_cli.inverse.study import RecordedConfig
-from pathwalker_cli.inverse.text import trial_notes
+from pathwalker_cli.inverse.text import stance_notes
 from pathwalker_cli.io import c3d
 from pathwalker_cli.io.c3d_write import write_c3d as write_recording
 from pathwalker_cli.io.json_file import read_json
-from pathwalker_cli.io.opensim import read_opensim
 from pathwalker_cli.io.recordings import read_compact
 from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.io.yaml_file import read_mapping
@@ -135,7 +134,6 @@ READERS: Final[dict[str, tuple[Read, str, Callable[[], bytes]]]] = {
     "trajectory": (read_trajectory, "made.csv", lambda: angles().encode()),
     "angles": (compact, "walk_angles.csv", lambda: angles().encode()),
     "events": (compact, "run_events.csv", lambda: EVENTS),
-    "opensim": (read_opensim, "made.mot", lambda: b"made\nnRows=1\nendheader\ntime\tx\n0\t1\n"),
     "motion": (read_motion, "made.npz", motion),
     "multipliers": (read_multipliers, "made.npz", lambda: arrays(unknowns=[1.0], rows=[2.0])),
     "metrics": (read_json, "made.json", lambda: json.dumps({"a": [1, None], "b": "x"}).encode()),
@@ -304,7 +302,7 @@ def test_recordings_with_anything_in_them_are_evaluated_or_refused(seed: int) ->
     def read(path: Path) -> None:
         for trial, _ in c3d_trials(path, patient, "barefoot", config):
             assert np.isfinite(trial.motion.values).all()
-            assert all(map(str.isprintable, (*trial_notes([trial]), *trial.doubts)))
+            assert all(map(str.isprintable, (*trial.remarks, *stance_notes(trial), *trial.doubts)))
 
     tried(read, "walk.c3d", (folder() / "walk.c3d").read_bytes())
 

@@ -10,14 +10,14 @@ import pytest
 from pathwalker_cli.conventions import GRAVITY
 from pathwalker_cli.evaluation.norms import (
     CLASSES,
-    movement_profile,
+    PROFILE,
     norms,
-    profile_score,
     speed_class,
     within_norms,
 )
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.stride.stride import Stride
 
 PUBLISHED = {
@@ -75,11 +75,24 @@ def test_typical_children_are_within_and_others_are_not() -> None:
 
 
 def test_the_profile_is_how_far_off_and_the_score_their_root_mean_square() -> None:
-    profile = movement_profile(stride(1.0, 8.0))
-    assert profile["angle_knee"] == pytest.approx(8.0)
-    assert profile["angle_hip"] == pytest.approx(0.0, abs=1e-9)
-    assert profile_score([stride(1.0, 8.0)]) == pytest.approx(8.0 / np.sqrt(4.0))
-    assert np.isnan(profile_score([]))
+    made = stride(1.0, 8.0)
+    profile = {measure.key: measure.of(made) for measure in PROFILE}
+    assert np.degrees(profile["movement_profile_knee_right"]) == pytest.approx(8.0)
+    assert profile["movement_profile_hip_left"] == pytest.approx(0.0, abs=1e-9)
+    for key in ("gait_profile_score", "gait_profile_score_left"):
+        assert np.degrees(profile[key]) == pytest.approx(8.0 / np.sqrt(4.0))
+    own = replace(made, side="left", part="stride")
+    assert [m.key for m in PROFILE if m.of(own) is None and m.side == "left"] == []
+    assert [m.key for m in PROFILE if m.of(own) is not None and m.side == "right"] == []
+
+
+def test_numbers_over_leg_length_are_those_of_every_size() -> None:
+    """A stride of 1 s at the speed whose square is gravity times leg length."""
+    leg = build_walker(load_patient("sreenivasa2017-healthy")).leg_length
+    made = stride(float(np.sqrt(GRAVITY * leg)), 0.0)
+    assert measure_of("normalised_walking_speed").of(made) == pytest.approx(1.0)
+    expected = 2.0 * np.sqrt(leg / GRAVITY)
+    assert measure_of("normalised_cadence").of(made) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,7 @@ from made_patients import (
     rows_of,
     similar,
 )
+from opensim_tables import read_opensim
 from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import (
@@ -53,7 +54,7 @@ from pathwalker_cli.gait.costs import Costs, Instant
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.symmetry import asymmetries, full_stride
 from pathwalker_cli.inverse.files import write_strengths_yaml
-from pathwalker_cli.io.opensim import read_opensim, write_opensim
+from pathwalker_cli.io.opensim import write_opensim
 from pathwalker_cli.io.trajectory_csv import read_trajectory, write_trajectory
 from pathwalker_cli.io.yaml_file import yaml_text
 from pathwalker_cli.model.anthropometry import segments

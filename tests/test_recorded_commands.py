@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 import shutil
 from collections.abc import Callable
@@ -15,6 +16,7 @@ import yaml
 from click.testing import CliRunner, Result
 
 from made_c3d import cut, folder, motion, text, write_c3d
+from opensim_tables import read_opensim
 from pathwalker_cli.commands.recorded import id_command, ik_command, import_command
 from pathwalker_cli.errors import ConfigError, DataError, InputError
 from pathwalker_cli.inverse.figures import joint_torque_figure, save_recorded_figures
@@ -23,7 +25,7 @@ from pathwalker_cli.inverse.strengths import strength_table
 from pathwalker_cli.inverse.study import load_inverse_dynamics, load_inverse_kinematics
 from pathwalker_cli.inverse.trials import dynamics_trials
 from pathwalker_cli.io.atomic import staged_folder
-from pathwalker_cli.io.opensim import read_opensim, write_opensim
+from pathwalker_cli.io.opensim import write_opensim
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.patient import load_patient
@@ -71,13 +73,18 @@ def test_import_finds_the_made_motion(tmp_path: Path) -> None:
     result = imported(write_c3d(tmp_path / "walk.c3d"), out)
     assert result.exception is None, result.output
     assert {path.name for path in out.iterdir()} == {
-        "walk_angles.csv", "walk_angles.mot", "walk_events.csv", "walk_residuals.csv",
+        "walk_angles.csv", "walk_angles.mot", "walk_events.csv", "walk_reading.json",
+        "walk_residuals.csv",
     }  # fmt: skip
     angles = read_trajectory(out / "walk_angles.csv")
     assert angles.values == pytest.approx(motion()[0], abs=1e-5)
     assert read_opensim(out / "walk_angles.mot").values == pytest.approx(angles.values, abs=1e-5)
     assert len(rows(out / "walk_residuals.csv")) == 18
     assert "has no force plates, so there are no forces" in result.output
+    reading = json.loads((out / "walk_reading.json").read_text(encoding="utf-8"))
+    assert (reading["trial"], reading["frames"], reading["strides"]) == ("walk", 120, 2)
+    assert reading["warnings"] == ["has no force plates, so there are no forces"]
+    assert (reading["notes"], reading["laboratory"]) == ([], [])
 
 
 def test_import_with_a_plate_writes_forces_and_says_why_they_are_unknown(tmp_path: Path) -> None:
@@ -375,13 +382,6 @@ def test_opensim_tables_are_read_again(tmp_path: Path) -> None:
         "x", "version=1", "nRows=2", "nColumns=3", "inDegrees=no", "endheader"
     ]  # fmt: skip
     assert read_opensim(path).values == pytest.approx(values, nan_ok=True)
-    lines = path.read_text(encoding="utf-8").replace("nRows=2", "nRows=3")
-    path.write_text(lines, encoding="utf-8")
-    with pytest.raises(DataError, match="has 2 rows"):
-        read_opensim(path)
-    path.write_text(lines.replace("=no", "=yes"), encoding="utf-8")
-    with pytest.raises(DataError, match="in degrees"):
-        read_opensim(path)
 
 
 def test_staged_folder_refuses_a_file_in_its_place(tmp_path: Path) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -48,7 +48,13 @@ _SET = set_option("Override a config value.")
 @click.option("--markers", help="Marker set, a file; by the markers' names if left out.")
 @click.option("--subject", metavar="NAME", help="Whose markers, if a file names several.")
 @click.option("--mend-plates", is_flag=True, help="Mend plates that are stored wrongly.")
+@click.option(
+    "--exchange",
+    is_flag=True,
+    help="Also write .trc, plates as .mot, and C3D copies that hold our angles and moments.",
+)
 @_QUIET
+@json_option
 def import_command(
     c3d: tuple[str, ...],
     patient: str,
@@ -57,20 +63,24 @@ def import_command(
     markers: str | None,
     subject: str | None,
     mend_plates: bool,
+    exchange: bool,
     quiet: bool,
+    as_json: bool,
 ) -> None:
     """Turn C3D files, or folders of them, into angles, events and forces.
 
     Beside a patient's file, in recordings/barefoot or recordings/orthosis, they are found by id and
     by the problems that start from recorded gait.
     """
-    from pathwalker_cli.inverse.files import write_trial
+    from pathwalker_cli.inverse.files import write_exchange, write_trial
     from pathwalker_cli.inverse.study import Paths, RecordedConfig
-    from pathwalker_cli.inverse.trials import kinematics_trials
+    from pathwalker_cli.inverse.trials import kinematics_trials, with_torques
 
     def write(folder: Path, trials: Sequence[Trial], who: Patient) -> None:
         for trial in trials:
-            write_trial(folder, trial)
+            write_trial(folder, trial, who, config.largest_marker_distance)
+            if exchange:
+                write_exchange(folder, with_torques(trial, who), who.body_mass)
 
     files = Paths.model_validate({condition: c3d})
     config = RecordedConfig(
@@ -81,7 +91,7 @@ def import_command(
         subject=subject,
         mend_plates=mend_plates,
     )
-    _study(config, kinematics_trials, write, out, quiet)
+    _study(config, kinematics_trials, write, out, quiet, as_json)
 
 
 @click.command("ik")
@@ -89,18 +99,21 @@ def import_command(
 @_OUT
 @_SET
 @_QUIET
-def ik_command(config: str, out: Path | None, changes: tuple[str, ...], quiet: bool) -> None:
+@json_option
+def ik_command(
+    config: str, out: Path | None, changes: tuple[str, ...], quiet: bool, as_json: bool
+) -> None:
     """Compute joint angles from the markers of the C3D files that CONFIG names."""
     from pathwalker_cli.inverse.files import write_kinematics
     from pathwalker_cli.inverse.study import load_inverse_kinematics
     from pathwalker_cli.inverse.trials import kinematics_trials
 
     def write(folder: Path, trials: Sequence[Trial], patient: Patient) -> None:
-        write_kinematics(folder, trials, patient.body_mass)
+        write_kinematics(folder, trials, patient, study.largest_marker_distance)
 
     with meant_as("inverse-kinematics", config):
         study = load_inverse_kinematics(config, changes)
-    _study(study, kinematics_trials, write, out or Path("runs", study.study), quiet)
+    _study(study, kinematics_trials, write, out or Path("runs", study.study), quiet, as_json)
 
 
 @click.command("id")
@@ -143,18 +156,17 @@ def id_command(
     def write(folder: Path, trials: Sequence[Trial], patient: Patient) -> _Findings:
         tables = residual_tables(trials, patient, study)
         strengths = strength_table(trials, patient, study)
-        write_dynamics(folder, trials, tables, strengths, patient, study.method)
+        write_dynamics(folder, trials, tables, strengths, patient, study)
         warnings = study_warnings(trials, tables, patient, study.largest_residual)
         shown = (residuals_renderable(tables), strengths_renderable(strengths))
         changed = _updated(patient, trials, strengths, study.method) if update_patient else ""
-        content = dynamics_content(trials, tables, strengths) if as_json else None
-        return _Findings(warnings, shown, changed, content)
+        return _Findings(warnings, shown, changed, dynamics_content(tables, strengths))
 
     with meant_as("inverse-dynamics", config):
         study = load_inverse_dynamics(config, changes)
     if update_patient:
         require_own_patient(load_patient(study.patient))
-    _study(study, dynamics_trials, write, out or Path("runs", study.study), quiet)
+    _study(study, dynamics_trials, write, out or Path("runs", study.study), quiet, as_json)
 
 
 def _updated(patient: Patient, trials: Sequence[Trial], table: StrengthTable, method: str) -> str:
@@ -180,7 +192,7 @@ class _Findings:
     warnings: Sequence[str] = ()
     tables: Sequence[RenderableType] = ()
     changed: str = ""
-    content: dict[str, Any] | None = None
+    content: Mapping[str, Any] = field(default_factory=dict)
 
 
 def _study(
@@ -189,30 +201,51 @@ def _study(
     write: Callable[[Path, Sequence[Trial], Patient], _Findings | None],
     out: Path,
     quiet: bool,
+    as_json: bool,
 ) -> None:
     """Evaluate the trials of a config, write all files or none, and report."""
     from rich.console import Console
 
-    from pathwalker_cli.inverse.text import trial_notes, trial_warnings, trials_renderable
+    from pathwalker_cli.inverse.text import (
+        laboratory_renderable,
+        stance_notes,
+        trial_content,
+        trials_renderable,
+        warnings,
+    )
     from pathwalker_cli.io.atomic import staged_folder
     from pathwalker_cli.patient import load_patient
 
-    patient = load_patient(config.patient)
+    patient, limit = load_patient(config.patient), config.largest_marker_distance
     with staged_folder(out) as folder:
         with Console(stderr=True, quiet=quiet).status("") as status:
             trials = evaluate(config, patient, status.update)
         findings = write(folder, trials, patient) or _Findings()
-    if findings.content is not None:
-        content = {"folder": str(out), **findings.content, "updated": findings.changed or None}
-        print_json({**content, "warnings": list(findings.warnings)})
+    if as_json:
+        print_json(
+            {
+                "folder": str(out),
+                "trials": [trial_content(trial, patient, limit) for trial in trials],
+                **findings.content,
+                "updated": findings.changed or None,
+                "warnings": list(findings.warnings),
+            }
+        )
     # As wide as the terminal, or wide enough without one.
-    quiet = quiet or findings.content is not None
-    console = Console(quiet=quiet, width=None if Console().is_terminal else 120)
-    notes = [f"note: {note}" for note in trial_notes(trials)]
+    console = Console(quiet=quiet or as_json, width=None if Console().is_terminal else 120)
+    said = [
+        f"note: {trial.name}: {note}"
+        for trial in trials
+        for note in (*trial.remarks, *stance_notes(trial))
+    ]
+    beside = laboratory_renderable(trials, patient.body_mass)
     ends = [f"Written to {out}", *filter(None, [findings.changed])]
-    for part in (trials_renderable(trials), *notes, *findings.tables, *ends):
+    for part in (trials_renderable(trials), *said, beside, *findings.tables, *ends):
         plain = isinstance(part, str)
-        console.print(part, soft_wrap=plain, markup=not plain, highlight=not plain)
-    limit = config.largest_marker_distance
-    for warning in (*trial_warnings(trials, patient.height, limit), *findings.warnings):
+        if part is not None:
+            console.print(part, soft_wrap=plain, markup=not plain, highlight=not plain)
+    every = [
+        f"{trial.name}: {w}" for trial in trials for w in warnings(trial, patient.height, limit)
+    ]
+    for warning in (*every, *findings.warnings):
         click.echo(f"warning: {warning}", err=True)

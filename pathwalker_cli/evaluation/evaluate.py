@@ -17,7 +17,7 @@ from pathwalker_cli.evaluation.differences import (
     rms_mean_cycle,
     rms_one_trial,
 )
-from pathwalker_cli.evaluation.norms import norm_notes
+from pathwalker_cli.evaluation.norms import PROFILE, norm_note
 from pathwalker_cli.evaluation.paper import (
     PATIENT,
     PaperClaim,
@@ -149,11 +149,11 @@ def evaluate_gait(
     """
     recorded = recorded or recorded_gait(gait.walker)
     reference = reference_stride(recorded, trial) if recorded else None
-    values = {measure.key: measure.of(gait) for measure in measures_in("evaluate")}
+    values = {measure.key: measure.of(gait) for measure in _measures()}
     spreads: dict[str, Spread] = {}
     notes = gait.notes
     if gait.walker.condition == "barefoot" and gait.part is None:
-        notes += norm_notes(gait, () if recorded is None else recorded.cycles)
+        notes += (norm_note(gait),)
     if recorded is None:
         notes += (
             f"patient {gait.walker.patient.id} has no {gait.walker.condition} recordings beside "
@@ -161,7 +161,7 @@ def evaluate_gait(
             "compared",
         )
     else:
-        spreads = recorded_numbers(recorded)
+        spreads = recorded_numbers(recorded, _measures())
         for more, recorded_too, note in _differences(gait, recorded, reference):
             values |= more
             spreads |= recorded_too
@@ -195,9 +195,14 @@ def evaluate_gaits(gaits: Sequence[Stride], trial: str | None = None) -> list[Ev
     return [evaluate_gait(gait, name) for gait, name in zip(gaits, trials, strict=True)]
 
 
+def _measures() -> tuple[Measure, ...]:
+    """Return what a gait says without recordings."""
+    return (*measures_in("evaluate"), *PROFILE)
+
+
 def compared() -> tuple[Measure, ...]:
     """Return all measures in which a gait is compared, in the order in which they are shown."""
-    found = (*measures_in("evaluate"), *DIFFERENCES)
+    found = (*_measures(), *DIFFERENCES)
     return tuple(sorted(found, key=lambda measure: SECTIONS.index(measure.section)))
 
 
@@ -207,7 +212,7 @@ def gait_changes(barefoot: Evaluation, orthosis: Evaluation) -> tuple[Change, ..
     before = {row.measure.key: row for row in barefoot.rows}
     after = {row.measure.key: row for row in orthosis.rows}
     changes = []
-    for measure in measures_in("evaluate"):
+    for measure in _measures():
         first, second = before.get(measure.key), after.get(measure.key)
         if first is None or second is None or first.value is None or second.value is None:
             continue

@@ -6,18 +6,19 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Final
 
 import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured
 
-from pathwalker_cli.conventions import GRAVITY, SIDES
+from pathwalker_cli.conventions import GRAVITY, SIDES, Side
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.stride.figures.curves import ANGLES, MOMENTS, POWERS
-from pathwalker_cli.stride.stride import Stride
+from pathwalker_cli.stride.measure import TYPICAL, Measure, per_side
+from pathwalker_cli.stride.stride import NotKnownError, Stride
 
 CLASSES: Final = (
     ("very_slow", 0.227),
@@ -71,21 +72,23 @@ def norms(speed: str) -> Mapping[str, Norm]:
     }
 
 
-def _off(stride: Stride) -> dict[str, tuple[np.ndarray, Norm]]:
+def _off(stride: Stride, side: Side) -> dict[str, tuple[np.ndarray, Norm]]:
     """Return the differences to typical children at the speed of a stride, by key of the curve.
 
-    Of a recorded cycle its own side counts.
+    Over the cycle of a side, shape (51,) each; none of a curve that is not known.
     """
-    typical, sides = norms(speed_class(stride)), SIDES if stride.side is None else (stride.side,)
-    found = {}
-    for curve in (*ANGLES, *MOMENTS):
-        norm = typical.get(curve.key)
-        if norm is not None:
-            each = (curve.lines(stride, side, norm.mean.size) for side in sides)
-            lines = np.array([line for one in each for line in one])
-            if lines.size:
-                found[curve.key] = lines - norm.mean, norm
-    return found
+    typical = norms(speed_class(stride))
+    return {
+        curve.key: (line - norm.mean, norm)
+        for curve in (*ANGLES, *MOMENTS)
+        if (norm := typical.get(curve.key))
+        for line in curve.lines(stride, side, norm.mean.size)
+    }
+
+
+def _sides(stride: Stride) -> tuple[Side, ...]:
+    """Return the sides whose cycles a stride shows: of a recorded one its own."""
+    return SIDES if stride.side is None else (stride.side,)
 
 
 def within_norms(stride: Stride, deviations: float = 2.0) -> dict[str, float]:
@@ -93,47 +96,65 @@ def within_norms(stride: Stride, deviations: float = 2.0) -> dict[str, float]:
 
     At the speed of the stride, right and left pooled, by key of the curve; [1].
     """
-    off = _off(stride).items()
-    return {k: float(np.mean(np.abs(lines) < deviations * norm.sd)) for k, (lines, norm) in off}
+    inside: dict[str, list[float]] = {}
+    for side in _sides(stride):
+        for key, (line, norm) in _off(stride, side).items():
+            share = float(np.mean(np.abs(line) < deviations * norm.sd))
+            inside.setdefault(key, []).append(share)
+    return {key: float(np.mean(shares)) for key, shares in inside.items()}
 
 
-def movement_profile(stride: Stride) -> dict[str, float]:
-    """Return the sagittal part of the Movement Analysis Profile by key of the angle [deg].
-
-    Root mean square differences to typical children at the speed of the stride, right and left
-    pooled; their root mean square is the sagittal part of the Gait Profile Score.
-
-    References:
-        Baker et al. (2009) Gait & Posture 30, 265-269.
-    """
-    angles = {curve.key for curve in ANGLES}
-    off = {key: lines for key, (lines, _) in _off(stride).items() if key in angles}
-    return {key: float(np.sqrt(np.mean(lines**2))) for key, lines in off.items()}
+def _variable_score(stride: Stride, side: Side, key: str) -> float:
+    """Return the root mean square difference of one angle [rad]: a bar of the profile."""
+    off = _off(stride, side)
+    if key not in off:
+        raise NotKnownError(key)
+    return float(np.radians(np.sqrt(np.mean(off[key][0] ** 2))))
 
 
-def profile_score(strides: Iterable[Stride]) -> float:
-    """Return the mean sagittal Gait Profile Score of some strides [deg]; NaN without any."""
-    profiles = [[*movement_profile(stride).values()] for stride in strides]
-    scores = [float(np.sqrt(np.mean(np.square(each)))) for each in profiles if each]
-    return float(np.mean(scores)) if scores else float("nan")
+def _profile_score(stride: Stride, side: Side | None = None) -> float:
+    """Return the root mean square of the bars of one side, or of all that are known [rad]."""
+    sides = _sides(stride) if side is None else (side,)
+    bars = [_variable_score(stride, each, angle.key) for each in sides for angle in _SAGITTAL]
+    return float(np.sqrt(np.mean(np.square(bars))))
 
 
-def norm_notes(stride: Stride, recorded: Iterable[Stride] = ()) -> tuple[str, ...]:
-    """Return in sentences how near a gait is to that of typical children at its speed.
+_SAGITTAL: Final = tuple(curve for curve in ANGLES if curve.key in QUANTITIES)
 
-    Args:
-        stride: The gait.
-        recorded: Recorded cycles, each judged at its own speed.
-    """
-    shares, profile = within_norms(stride), movement_profile(stride)
-    curves = [curve for curve in ANGLES if curve.key in shares]
-    inside = ", ".join(f"{curve.name} {100.0 * shares[curve.key]:.0f}" for curve in curves)
-    parts = ", ".join(f"{curve.name} {profile[curve.key]:.1f}" for curve in curves)
-    own = profile_score(recorded)
-    beside = "" if np.isnan(own) else f"; of the recorded cycles {own:.1f}"
+PROFILE: Final = (
+    *(
+        measure
+        for curve in _SAGITTAL
+        for measure in per_side(
+            f"movement_profile_{curve.key.removeprefix('angle_')}_*",
+            f"{curve.name} off typical children, *", "rad",
+            "root mean square difference of the angle to typical children at the same speed",
+            partial(_variable_score, key=curve.key), f"{curve.name}, *", section=TYPICAL,
+            kept=False,
+        )
+    ),
+    *per_side("gait_profile_score_*", "sagittal Gait Profile Score, *", "rad",
+              "root mean square of the four", _profile_score, "score, *", section=TYPICAL,
+              kept=False),
+    Measure("gait_profile_score", "sagittal Gait Profile Score", "rad",
+            "root mean square of the four of both sides", _profile_score, "score",
+            section=TYPICAL, kept=False),
+)  # fmt: skip
+"""The sagittal part of the Movement Analysis Profile, and of the Gait Profile Score.
+
+References:
+    Baker et al. (2009) Gait & Posture 30, 265-269.
+"""
+
+
+def norm_note(stride: Stride) -> str:
+    """Return in a sentence how near a gait is to that of typical children at its speed."""
+    shares = within_norms(stride)
+    inside = ", ".join(
+        f"{curve.name} {100.0 * shares[curve.key]:.0f}" for curve in ANGLES if curve.key in shares
+    )
     speed = speed_class(stride).replace("_", " ")
     return (
         f"within two standard deviations of typical children at a {speed} speed (Schwartz et al. "
-        f"2008), share of the gait cycle [%]: {inside}",
-        f"sagittal Gait Profile Score {profile_score([stride]):.1f} deg ({parts}){beside}",
+        f"2008), share of the gait cycle [%]: {inside}"
     )

@@ -21,6 +21,7 @@ from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.inverse.trials import recorded_trials
 from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.model.walker import Walker
+from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.stride.stride import POINTS, Part, Stride
 
@@ -121,11 +122,18 @@ def recorded_gait(walker: Walker) -> RecordedGait | None:
     return RecordedGait(walker, tuple(trials))
 
 
-def recorded_numbers(recorded: RecordedGait) -> dict[str, Spread]:
-    """Return mean and range of what recordings say, by key beside recordings, SI units."""
+def recorded_numbers(
+    recorded: RecordedGait, measures: Iterable[Measure] | None = None
+) -> dict[str, Spread]:
+    """Return mean and range of what recordings say, by key beside recordings, SI units.
+
+    Args:
+        recorded: The recordings.
+        measures: What to ask them; what `evaluate` compares if left out.
+    """
     spreads = {
         measure.key: spread(v for s in recorded.strides if (v := measure.of(s)) is not None)
-        for measure in measures_in("evaluate")
+        for measure in measures or measures_in("evaluate")
     }
     return {key: values for key, values in spreads.items() if values is not None}
 

@@ -182,12 +182,18 @@ def _least_speed(walker: Walker, config: BoundsConfig, sources: dict[str, str]) 
     elif recorded is not None:
         speed, source = recorded.walking_speed.mean, "mean of the barefoot recordings"
     else:
-        ratio = config.fallback_speed_ratio
-        # The shoe lengthens the leg, but both conditions must be asked for the same speed.
-        speed = ratio * float(np.sqrt(GRAVITY * walker.patient.leg_length))
+        ratio, speed = config.fallback_speed_ratio, fallback_speed(walker.patient, config)
         source = f"fallback: {ratio:g} sqrt(g barefoot leg length), the patient has no recordings"
     sources["walking_speed"] = f"at least {speed:.3f} m/s, {source}"
     return speed
+
+
+def fallback_speed(patient: Patient, config: BoundsConfig) -> float:
+    """Return a slow walk of these legs [m/s].
+
+    The shoe lengthens the leg, but both conditions must be asked for the same speed.
+    """
+    return config.fallback_speed_ratio * float(np.sqrt(GRAVITY * patient.leg_length))
 
 
 def _unknowns(

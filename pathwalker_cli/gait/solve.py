@@ -14,6 +14,7 @@ from pathwalker_cli.config import MeshConfig, StudyConfig
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
+    fallback_speed,
     gait_bounds,
     helped_bounds,
     recorded_durations,
@@ -126,9 +127,10 @@ class GaitSolver:
 
     @property
     def start_speed(self) -> float:
-        """Speed of a synthetic start [m/s]: the config's, or the least speed allowed."""
+        """Speed of a synthetic start [m/s]: the config's, or a slow walk of these legs."""
         least = self.bounds.table.entries[("walking_speed",)][0]
-        return self.config.start.walking_speed or least
+        slow = fallback_speed(self.walker.patient, self.config.bounds)
+        return self.config.start.walking_speed or max(least, slow)
 
     @cached_property
     def samples(self) -> tuple[Sample, ...]:

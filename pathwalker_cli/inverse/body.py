@@ -17,10 +17,10 @@ import numpy as np
 
 from pathwalker_cli.conventions import GRAVITY, SIDES, Side
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.joint_centres import LEFTWARD, beside_joint, hip_centre
 from pathwalker_cli.inverse.marker_sets import (
     KnownSet,
     foot_places,
-    hip_centre,
     recognised,
     set_points,
 )
@@ -40,6 +40,20 @@ _WIDTHS: Final = (0.08, 0.45)
 """Distances of the front spines that can be [m]."""
 _ANKLES: Final = (0.02, 0.13)
 """Heights of an ankle marker over the floor that can be [m]; otherwise z = 0 is not the floor."""
+_ANKLE: Final = 0.06
+"""Height of an ankle of a body of unknown height [m]: that of 1.5 m."""
+_STILL: Final = 0.05
+"""Standard deviation of the load on all plates, as a share of it, up to which somebody stands there
+and does not walk: walks give 0.47 or more."""
+_LIGHTEST: Final = 5.0
+"""Body mass below which plates carry something else [kg]."""
+_TO_TOE: Final = 0.78
+"""Ankle to toe marker as a share of heel to toe marker: 0.67 to 0.87 on eight feet in four public
+recordings that have heel markers."""
+_TO_HEEL: Final = 0.28
+"""Heel marker behind the ankle as a share of the toe marker before it: 0.19 to 0.53 on these."""
+_LOWEST: Final = 0.1
+"""Quantile of the height of an ankle at which its foot stands flat."""
 
 Sole = Mapping[str, tuple[float, float]]
 
@@ -95,7 +109,7 @@ def measured_body(
     height = _told(recording, _HEIGHT, height, "height", sources)
     if height is None:
         height = _from_neck(recording, known, sources)
-    lengths = _lengths(recording, known)
+    lengths = _lengths(recording, known, height or _CHILD)
     name = recording.name
     sources += [
         f"thigh, shank: {name}, hip joint centres by Davis et al. (1991)",
@@ -141,7 +155,7 @@ def _weighed(recording: Recording, sources: list[str]) -> float | None:
         return None
     up = np.abs(np.sum([plate.force[:, 2] for plate in recording.plates], axis=0))
     mean, spread = float(np.median(up)), float(np.std(up))
-    if mean < 5.0 * GRAVITY or spread > 0.05 * mean:
+    if mean < _LIGHTEST * GRAVITY or spread > _STILL * mean:
         return None
     sources.append(f"body mass: what the plates carry in {recording.name}")
     return round(mean / GRAVITY, 1)
@@ -156,12 +170,14 @@ def _from_neck(recording: Recording, known: KnownSet, sources: list[str]) -> flo
     if not _HEIGHTS[0] <= height <= _HEIGHTS[1]:
         return None
     sources.append(
-        f"height: {marker} of {recording.name}, 0.865 of the height (Gordon et al. 1989)"
+        f"height: {marker} of {recording.name}, {_CERVICAL:g} of it (Gordon et al. 1989)"
     )
     return round(height, 3)
 
 
-def _lengths(recording: Recording, known: KnownSet) -> dict[str, tuple[float, float]]:
+def _lengths(
+    recording: Recording, known: KnownSet, body_height: float
+) -> dict[str, tuple[float, float]]:
     """Return the lengths of both sides [m], medians over the frames."""
     front, back = known.middle("asis", recording), known.middle("psis", recording)
     spines = [recording.marker(known.markers["asis", side]) for side in SIDES]
@@ -179,19 +195,19 @@ def _lengths(recording: Recording, known: KnownSet) -> dict[str, tuple[float, fl
     left = _unit(left)
     up = np.cross(ahead, left)
     every: dict[str, list[float]] = {"thigh": [], "shank": [], "foot": []}
-    for side, spine, sign in zip(SIDES, spines, (-1.0, 1.0), strict=True):
+    for side, spine in zip(SIDES, spines, strict=True):
         knee = recording.marker(known.markers["knee", side])
         ankle = recording.marker(known.markers["ankle", side])
         leg = _apart(spine, knee) + _apart(knee, ankle)
         behind, aside, below = hip_centre(leg, width)
-        hip = front - behind * ahead + sign * aside * left - below * up
+        hip = front - behind * ahead + LEFTWARD[side] * aside * left - below * up
         toe = recording.marker(known.markers["toe", side])
         heel = known.markers.get(("heel", side))
-        every["thigh"].append(_apart(hip, knee))
+        beside = beside_joint("knee", side, body_height, recording.numbers)
+        every["thigh"].append(round(float(np.sqrt(_apart(hip, knee) ** 2 - beside**2)), 3))
         every["shank"].append(_apart(knee, ankle))
-        # without a heel marker: the share of the model's foot that lies before the ankle
         every["foot"].append(
-            _apart(recording.marker(heel), toe) if heel else _apart(ankle, toe) / 0.78
+            _apart(recording.marker(heel), toe) if heel else _apart(ankle, toe) / _TO_TOE
         )
     lost = [name for name, values in every.items() if not np.isfinite(values).all()]
     if lost:
@@ -206,11 +222,11 @@ def _soles(
     places = foot_places(known, recording)
     soles: dict[Side, dict[str, tuple[float, float]]] = {}
     for side in SIDES:
-        ankle = float(np.nanquantile(recording.marker(known.markers["ankle", side])[:, 2], 0.1))
+        ankle = float(np.nanquantile(recording.marker(known.markers["ankle", side])[:, 2], _LOWEST))
         if not _ANKLES[0] <= ankle <= _ANKLES[1]:
-            ankle = ANKLE_HEIGHT * height if height else _ANKLES[0] * 3.0
+            ankle = ANKLE_HEIGHT * height if height else _ANKLE
         toe = places["toe", side][0]
-        heel = places.get(("heel", side), (-0.28 * toe, 0.0))[0]
+        heel = places.get(("heel", side), (-_TO_HEEL * toe, 0.0))[0]
         soles[side] = {"heel": (round(heel, 3), -round(ankle, 3)),
                        "toe": (round(toe, 3), -round(ankle, 3))}  # fmt: skip
     return soles

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from pathwalker_cli.conventions import SIDES, SUFFIX, Condition, Side
 from pathwalker_cli.inverse.cycles import gait_cycles
 from pathwalker_cli.inverse.forces import foot_extents, ground_forces, plate_loads
 from pathwalker_cli.inverse.found_events import events_of_motion, set_by_plates
-from pathwalker_cli.inverse.marker_sets import KnownSet, recognised, set_points
+from pathwalker_cli.inverse.joint_centres import legs_in_plane
+from pathwalker_cli.inverse.marker_sets import KnownSet, leg_length, recognised, set_points
 from pathwalker_cli.inverse.markers import (
     MarkerPoint,
     bridge_gaps,
@@ -20,21 +22,32 @@ from pathwalker_cli.inverse.markers import (
     marker_points,
 )
 from pathwalker_cli.inverse.misplaced import robust_kinematics
-from pathwalker_cli.inverse.stance_checks import LOADED
 from pathwalker_cli.inverse.study import RecordedConfig
 from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.inverse.walk import is_projected, orientation_doubts, walks
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.c3d_checks import check_markers, readable_recording
+from pathwalker_cli.io.c3d_plates import LOADED
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.trajectory import Trajectory
 
 
 def c3d_trials(
-    path: Path, patient: Patient, condition: Condition, config: RecordedConfig
+    path: Path,
+    patient: Patient,
+    condition: Condition,
+    config: RecordedConfig,
+    taken: Collection[str] = (),
 ) -> list[tuple[Trial, Recording]]:
     """Evaluate one C3D file: angles, events and, with force plates, forces, but no torques.
+
+    Args:
+        path: The file.
+        patient: The patient.
+        condition: What was worn.
+        config: What was chosen.
+        taken: Names of other recordings, which no pass takes.
 
     Returns:
         A trial for every pass, each with the recording as the file holds it.
@@ -44,11 +57,10 @@ def c3d_trials(
         DataError: If the recording cannot be used.
     """
     raw, known, points = read_markers(path, patient, condition, config)
-    trials = []
-    for walk in walks(raw, points):
-        placed = set_points(known, patient, walk, condition) if known else points
-        trials.append((_walk_trial(walk, placed, patient, condition, config), raw))
-    return trials
+    return [
+        (_walk_trial(walk, known, points, patient, condition, config), raw)
+        for walk in walks(raw, points, taken)
+    ]
 
 
 def read_markers(
@@ -76,6 +88,7 @@ def read_markers(
 
 def _walk_trial(
     walk: Recording,
+    known: KnownSet | None,
     points: tuple[MarkerPoint, ...],
     patient: Patient,
     condition: Condition,
@@ -84,16 +97,24 @@ def _walk_trial(
     """Return the trial of one pass in the walking plane."""
     names = tuple(point.marker for point in points)
     walk, gaps = bridge_gaps(walk, names, config.longest_gap)
+    flat = is_projected(walk, points)
+    fitted, ahead = walk, None
+    if known:
+        if not flat:
+            height = patient.height
+            fitted, ahead = legs_in_plane(walk, known.markers, leg_length(patient), height)
+        points = set_points(known, patient, fitted, condition)
     model: pin.Model = pinocchio_model(patient, condition)
     motion, distances, doubts = robust_kinematics(
-        model, walk, points, patient.height, config.longest_gap
+        model, fitted, points, patient.height, config.longest_gap
     )
     if not any(event.kind == "foot_strike" for event in walk.events):
         walk = _with_events(walk, model, motion)
-    aside = None if is_projected(walk, points) else _aside(walk, points)
-    forces = (
-        ground_forces(walk, model, motion, aside, mend=config.mend_plates) if walk.plates else None
-    )
+    forces = None
+    if walk.plates:
+        aside = None if flat else _aside(walk, points)
+        forces = ground_forces(walk, model, motion, aside, ahead, mend=config.mend_plates)
+        walk = replace(walk, plates=forces.loads, samples_per_frame=1)
     return Trial(
         walk.name,
         motion,
@@ -104,8 +125,7 @@ def _walk_trial(
         stances=forces.stances if forces else (),
         markers=distances,
         gaps=gaps,
-        first_frame=walk.first_frame,
-        remarks=walk.remarks,
+        walk=walk,
         doubts=(
             *orientation_doubts(walk, points),
             *doubts,

@@ -75,9 +75,6 @@ def joint_angle_figure(trials: Sequence[Trial]) -> Figure:
     """Return pelvis, hip, knee, ankle and lumbar angles over the gait cycle of each side.
 
     Flexion, dorsiflexion and forward lean are positive, as gait laboratories plot them.
-
-    Args:
-        trials: Trials of one condition.
     """
     bands = _bands(trials, lambda trial: trial.motion)
     fig = new_figure(3.9)
@@ -92,10 +89,6 @@ def joint_torque_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
 
     Internal torques; extension and plantarflexion are positive.  Only strides whose stance has a
     measured force count.
-
-    Args:
-        trials: Trials of one condition.
-        body_mass: Mass of the patient [kg].
     """
     bands = _bands(trials, lambda trial: trial.tau, measured=True)
     fig = new_figure(2.9)
@@ -106,12 +99,7 @@ def joint_torque_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
 
 
 def ground_force_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
-    """Return vertical and fore-aft ground reaction forces over the gait cycle of each side.
-
-    Args:
-        trials: Trials of one condition.
-        body_mass: Mass of the patient [kg].
-    """
+    """Return vertical and fore-aft ground reaction forces over the gait cycle of each side."""
     bands = _bands(trials, lambda trial: trial.forces, measured=True)
     fig = new_figure(2.2)
     _draw(fig.subplots(1, 2), bands, _FORCES, body_mass)

@@ -9,13 +9,23 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.inverse.figures import save_recorded_figures
+from pathwalker_cli.inverse.laboratory import angles, moments
 from pathwalker_cli.inverse.recorded import strength_lines
 from pathwalker_cli.inverse.residuals import COMPONENTS, ResidualTable
 from pathwalker_cli.inverse.strengths import StrengthTable
+from pathwalker_cli.inverse.study import InverseDynamicsConfig
+from pathwalker_cli.inverse.text import trial_content
 from pathwalker_cli.inverse.trial import Trial
+from pathwalker_cli.io.c3d_write import write_copy
 from pathwalker_cli.io.csv_file import as_text, write_table
 from pathwalker_cli.io.json_file import write_json
-from pathwalker_cli.io.opensim import force_table, torque_table, write_opensim
+from pathwalker_cli.io.opensim import (
+    force_table,
+    plate_table,
+    torque_table,
+    write_opensim,
+    write_trc,
+)
 from pathwalker_cli.io.recordings import write_recording
 from pathwalker_cli.io.trajectory_csv import write_trajectory
 from pathwalker_cli.patient import Patient
@@ -25,22 +35,26 @@ from pathwalker_cli.versions import today, versions
 ORIGIN: Final = "study.json"
 """File that says whose recorded gait was studied, how and when."""
 
+READING: Final = "_reading.json"
+"""End of the name of the file that says how a C3D file was read."""
+
 _MARKERS: Final = ("point", "rms [m]", "largest [m]", "frames seen", "frames bridged")
 
 
-def write_kinematics(folder: Path, trials: Sequence[Trial], body_mass: float) -> None:
+def write_kinematics(folder: Path, trials: Sequence[Trial], patient: Patient, limit: float) -> None:
     """Write trials and figures below a folder per condition, and the table of marker distances.
 
     Args:
         folder: Where; it must exist.
         trials: The trials.
-        body_mass: Mass of the patient [kg].
+        patient: The patient.
+        limit: Mean distance of the markers that is a warning, in body heights.
     """
     for condition in dict.fromkeys(trial.condition for trial in trials):
         own = [trial for trial in trials if trial.condition == condition]
         for trial in own:
-            write_trial(folder / condition, trial)
-        save_recorded_figures(own, folder / condition, body_mass)
+            write_trial(folder / condition, trial, patient, limit)
+        save_recorded_figures(own, folder / condition, patient.body_mass)
     if any(trial.markers for trial in trials):
         rows = [[t.condition, t.name, *row] for t in trials for row in _marker_rows(t)]
         write_table(folder / "marker_residuals.csv", ["condition", "trial", *_MARKERS], rows)
@@ -52,7 +66,7 @@ def write_dynamics(
     tables: Sequence[ResidualTable],
     strengths: StrengthTable,
     patient: Patient,
-    method: str,
+    config: InverseDynamicsConfig,
 ) -> None:
     """Write what `write_kinematics` writes, residuals, stances, strengths, and whose they are.
 
@@ -62,21 +76,21 @@ def write_dynamics(
         tables: Their residuals.
         strengths: Strengths, written if there are any.
         patient: The patient.
-        method: Name of the method.
+        config: What was chosen.
     """
-    write_kinematics(folder, trials, patient.body_mass)
+    write_kinematics(folder, trials, patient, config.largest_marker_distance)
     _write_residuals(folder / "residuals.csv", tables)
     _write_stances(folder / "stances.csv", trials)
     if strengths.strengths is not None:
         _write_strengths(folder / "strengths.csv", strengths)
-        source = strengths_source(method)
+        source = strengths_source(config.method)
         write_strengths_yaml(folder / "strengths.yaml", strengths.strengths, source)
     content = {
         "patient": patient.id,
         "age": patient.age,
         "body_mass": patient.body_mass,
         "height": patient.height,
-        "method": method,
+        "method": config.method,
         "date": today(),
         "versions": versions(),
         "notes": list(patient.notes),
@@ -89,8 +103,15 @@ def strengths_source(method: str) -> str:
     return f"inverse dynamics of recorded barefoot gait, method {method}"
 
 
-def write_trial(folder: Path, trial: Trial) -> None:
-    """Write one trial: angles, events, forces, torques and markers, as far as there are any."""
+def write_trial(folder: Path, trial: Trial, patient: Patient, limit: float) -> None:
+    """Write one trial: angles, events, forces, torques and markers, as far as there are any.
+
+    Args:
+        folder: Where.
+        trial: The trial.
+        patient: The patient.
+        limit: Mean distance of the markers that is a warning, in body heights.
+    """
     write_recording(folder, trial)
     stem = str(folder / trial.name)
     write_opensim(f"{stem}_angles.mot", trial.motion)
@@ -101,6 +122,27 @@ def write_trial(folder: Path, trial: Trial) -> None:
         write_opensim(f"{stem}_torques.sto", torque_table(trial.tau))
     if trial.markers is not None:
         write_table(f"{stem}_residuals.csv", _MARKERS, _marker_rows(trial))
+        write_json(f"{stem}{READING}", trial_content(trial, patient, limit))
+
+
+def write_exchange(folder: Path, trial: Trial, body_mass: float) -> None:
+    """Write what other programs read: .trc, plates as .mot, and a copy of the C3D file.
+
+    The copy holds our angles and, with torques, moments beside what the file has.
+
+    Args:
+        folder: Where.
+        trial: A trial that comes from C3D.
+        body_mass: Mass of the patient [kg].
+    """
+    if trial.walk is None or trial.walk.source is None:
+        return
+    stem = str(folder / trial.name)
+    write_trc(f"{stem}_markers.trc", trial.walk)
+    if trial.walk.plates:
+        write_opensim(f"{stem}_plates.mot", plate_table(trial.motion.time, trial.walk.plates))
+    curves = angles(trial) | moments(trial, body_mass)
+    write_copy(Path(f"{stem}_pathwalker.c3d"), trial.walk.source, curves, trial.first_frame)
 
 
 def _marker_rows(trial: Trial) -> list[list[object]]:

@@ -20,7 +20,6 @@ from pathwalker_cli.inverse.dynamics import FORCE_CUTOFF, low_pass, smooth_rates
 from pathwalker_cli.inverse.plate_checks import Footprint, plate_faults
 from pathwalker_cli.inverse.stance_checks import (
     EDGE,
-    LOADED,
     Evidence,
     StanceForce,
     judge,
@@ -30,7 +29,7 @@ from pathwalker_cli.inverse.stance_checks import (
 from pathwalker_cli.inverse.walk import about_vertical, turned
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.c3d_events import Event
-from pathwalker_cli.io.c3d_plates import ForcePlate
+from pathwalker_cli.io.c3d_plates import LOADED, ForcePlate, centre_of_pressure
 from pathwalker_cli.io.recordings import FORCE_COLUMNS
 from pathwalker_cli.trajectory import Trajectory
 
@@ -44,20 +43,6 @@ marker: the head lies at 72 % of the foot's length."""
 _HEADINGS: Final = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
 
 
-def centre_of_pressure(load: ForcePlate, least_force: float) -> np.ndarray:
-    """Return where the force's line of action meets the plate's surface [m], shape (samples, 3).
-
-    Without a moment about a horizontal axis at the surface; NaN where the vertical force is below
-    `least_force` [N].
-    """
-    fz = load.force[:, 2]
-    mx, my, _ = load.moment.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        point = np.stack([-my / fz, mx / fz, np.zeros_like(fz)], axis=-1) + load.centre
-    point[fz < least_force] = np.nan
-    return point
-
-
 @dataclass(frozen=True)
 class GroundForces:
     """Forces on both feet.
@@ -68,12 +53,14 @@ class GroundForces:
         stances: What is known about every stance.
         direction: Axis of the plates along which the patient walks, e.g. "-y".
         remarks: What was found wrong with the plates, a sentence each.
+        loads: The plates with x along the walk and their loads in every frame, filtered.
     """
 
     table: Trajectory
     stances: tuple[StanceForce, ...]
     direction: str = "+x"
     remarks: tuple[str, ...] = ()
+    loads: tuple[ForcePlate, ...] = ()
 
 
 def force_columns(time: np.ndarray, feet: Mapping[Side, np.ndarray]) -> Trajectory:
@@ -92,6 +79,7 @@ def ground_forces(
     model: pin.Model,
     motion: Trajectory,
     aside: Mapping[Side, np.ndarray] | None = None,
+    ahead: Mapping[Side, np.ndarray] | None = None,
     cutoff: float = FORCE_CUTOFF,
     mend: bool = False,
 ) -> GroundForces:
@@ -104,6 +92,8 @@ def ground_forces(
         aside: Per side, sideways position of the foot [m], shape (n,).  Without it the markers
             were laid into the walking plane, and the plates are turned to that of their axes for
             which the loads lie under the feet.
+        ahead: Per side, how far the foot stood ahead of the walker's [m], shape (n,); the centre of
+            pressure is given where it is under the walker's foot.
         cutoff: Cut-off frequency of the plates [Hz].
         mend: Whether to mend plates that are not stored as they stand.
 
@@ -113,6 +103,8 @@ def ground_forces(
     if not recording.plates:
         raise DataError("has no force plates", where=recording.name)
     feet, direction = foot_extents(model, motion.values), "+x"
+    if ahead is not None:
+        feet = {side: ends + ahead[side][:, None] for side, ends in feet.items()}
     loads = plate_loads(recording, cutoff)
     if aside is None:
         direction = plate_direction(loads, feet, recording.events)
@@ -138,8 +130,8 @@ def ground_forces(
         recording.first_frame,
     )
     judged = tuple(judge(stance, seen) for stance in stances(recording.events))
-    table = _compose(recording, judged, [load.force[:, [0, 2]] for load in loads], points)
-    return GroundForces(table, judged, direction, remarks)
+    table = _compose(recording, judged, [load.force[:, [0, 2]] for load in loads], points, ahead)
+    return GroundForces(table, judged, direction, remarks, tuple(loads))
 
 
 def plate_loads(recording: Recording, cutoff: float = FORCE_CUTOFF) -> list[ForcePlate]:
@@ -240,6 +232,7 @@ def _compose(
     judged: Sequence[StanceForce],
     forces: Sequence[np.ndarray],
     points: np.ndarray,
+    ahead: Mapping[Side, np.ndarray] | None,
 ) -> Trajectory:
     """Return force and centre of pressure of both feet from measured stances and swings."""
     frames = recording.positions.shape[0]
@@ -252,5 +245,7 @@ def _compose(
             rows = slice(max(item.stance.strike - EDGE, 0), item.stance.toe_off + EDGE)
             point = points[rows, item.plate]
             force = np.where(np.isfinite(point)[:, None], forces[item.plate][rows], 0.0)
+            if ahead is not None:
+                point = point - ahead[item.stance.side][rows]
             feet[item.stance.side][rows] = np.column_stack([force, point])
     return force_columns(recording.time, feet)

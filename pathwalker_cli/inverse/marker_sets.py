@@ -7,7 +7,7 @@ before or behind the bone they stand.
 
 References:
     Davis, Ounpuu, Tyburski, Gage (1991), A gait analysis data collection and reduction technique,
-    Human Movement Science 10, 575-587: hip joint centres and the names of Plug-in Gait.
+    Human Movement Science 10, 575-587: the names of Plug-in Gait.
     Kadaba, Ramakrishnan, Wootten (1990), Journal of Orthopaedic Research 8, 383-392: Helen Hayes.
     Cappozzo, Catani, Della Croce, Leardini (1995), Clinical Biomechanics 10, 171-178: CAST.
     Leboeuf et al. (2019), Gait & Posture 69, 235-241: CGM2.
@@ -17,18 +17,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
 from pathwalker_cli.conventions import SIDES, SUFFIX, Condition, Side
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.inverse.joint_centres import Landmark, hip_centre
 from pathwalker_cli.inverse.markers import MarkerPoint, load_marker_set
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import FootPoints
-
-Landmark = Literal["asis", "psis", "knee", "ankle", "toe", "heel", "c7", "clavicle"]
 
 _NEEDED: Final[tuple[Landmark, ...]] = ("asis", "psis", "knee", "ankle", "toe")
 
@@ -220,26 +219,14 @@ def _pitched(at: tuple[float, float], sole: FootPoints) -> tuple[float, float]:
     return float(cos * at[0] - sin * at[1]), float(sin * at[0] + cos * at[1])
 
 
-def hip_centre(leg: float, width: float = 0.0) -> tuple[float, float, float]:
-    """Return how far a hip joint is behind, beside and below the middle of the front spines [m].
-
-    Along the axes of the pelvis, by the regression of Davis et al. (1991).
-
-    Args:
-        leg: Length of the leg, spine to malleolus [m].
-        width: Distance between the front spines [m].
-    """
-    size, depth = 0.115 * leg - 0.0153, 0.1288 * leg - 0.04856 + 0.007
-    theta, beta = np.radians(28.4), np.radians(18.0)
-    behind = depth * np.cos(beta) - size * np.cos(theta) * np.sin(beta)
-    below = depth * np.sin(beta) + size * np.cos(theta) * np.cos(beta)
-    return float(behind), float(width / 2.0 - size * np.sin(theta)), float(below)
+def leg_length(patient: Patient) -> float:
+    """Return the length of a leg from spine to malleolus [m], both sides' mean."""
+    return _LEG * sum(patient.length(n, s) for n in ("thigh", "shank") for s in SIDES) / 2.0
 
 
 def _spine(patient: Patient) -> tuple[float, float]:
     """Return where the anterior spines are before and above the pelvis origin [m]."""
-    leg = _LEG * sum(patient.length(n, s) for n in ("thigh", "shank") for s in SIDES) / 2.0
-    behind, _, below = hip_centre(leg)
+    behind, _, below = hip_centre(leg_length(patient))
     return behind, below - patient.length("hip_drop", "right")
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import Side
 from pathwalker_cli.inverse.cycles import Stance
-from pathwalker_cli.io.c3d_plates import ForcePlate, plate_axes
+from pathwalker_cli.io.c3d_plates import LOADED, ForcePlate, centre_of_pressure, plate_axes
 
 _ORDERS: Final[Mapping[str, tuple[int, ...]]] = {
     "": (0, 1, 2, 3),
@@ -36,9 +36,6 @@ _UNITS: Final = {"": 1.0, "its moments 1000 times too large": 1e-3, "its moments
 
 _IDLE: Final = 0.1
 """Share of the frames, those of least load, in which nobody stands on a plate."""
-
-_ZERO: Final = 20.0
-"""Vertical force below which a plate counts as unloaded [N], and range of an unloaded one."""
 
 _SHARE: Final = 0.4
 """Peak load, as a share of the body's weight, from which a stance tells about a plate."""
@@ -137,7 +134,7 @@ def _zero_level(plate: ForcePlate) -> tuple[str, ForcePlate] | None:
     size = np.abs(plate.force[:, 2])
     lowest = size <= np.quantile(size, _IDLE)
     level = np.median(plate.force[lowest], axis=0)
-    if size.min() < _ZERO or np.ptp(plate.force[lowest, 2]) > _ZERO:
+    if size.min() < LOADED or np.ptp(plate.force[lowest, 2]) > LOADED:
         return None
     moment = plate.moment - np.median(plate.moment[lowest], axis=0)
     what = f"its zero level seems to be off by {level[2]:.0f} N"
@@ -198,36 +195,29 @@ def _walk(plate: ForcePlate, rows: _Rows, feet: Mapping[Side, Footprint]) -> _Wa
     """Return how the load on a plate behaves."""
     up = np.concatenate([plate.force[at, 2] for _, at in rows])
     size = float(np.abs(up).mean())
+    centres = centre_of_pressure(plate, -np.inf)
     rolls, drives = [], []
     for stance, at in rows:
         foot, progress = feet[stance.side], np.linspace(-0.5, 0.5, at.size)
-        rolls.append(np.polyfit(progress, _point(plate, at)[:, 0], 1)[0] / foot.length)
+        rolls.append(np.polyfit(progress, centres[at, 0], 1)[0] / foot.length)
         drives.append(np.polyfit(progress, plate.force[at, 0], 1)[0] / size)
     known = np.isfinite(feet[rows[0][0].side].aside).any()
     return _Walk(
         float(up.mean()) / size,
         float(np.mean(rolls)) if known else np.nan,
         float(np.mean(drives)) if known else np.nan,
-        _distance(plate, rows, feet),
+        _distance(centres, rows, feet),
     )
 
 
-def _distance(plate: ForcePlate, rows: _Rows, feet: Mapping[Side, Footprint]) -> float:
-    """Return how far the centre of pressure is from where it belongs, in foot lengths."""
+def _distance(centres: np.ndarray, rows: _Rows, feet: Mapping[Side, Footprint]) -> float:
+    """Return how far centres of pressure (n, 3) are from where they belong, in foot lengths."""
     misses = []
     for stance, at in rows:
         foot = feet[stance.side]
         share = np.linspace(0.0, 1.0, at.size)
         heel, tip = foot.ends[at].T
-        point = _point(plate, at)
-        ahead = point[:, 0] - (heel + share * (tip - heel))
-        aside = np.nan_to_num(point[:, 1] - foot.aside[at])
+        ahead = centres[at, 0] - (heel + share * (tip - heel))
+        aside = np.nan_to_num(centres[at, 1] - foot.aside[at])
         misses.append(np.hypot(ahead, aside) / foot.length)
     return float(np.median(np.concatenate(misses)))
-
-
-def _point(plate: ForcePlate, at: np.ndarray) -> np.ndarray:
-    """Return the centre of pressure in some frames [m], shape (frames, 2)."""
-    force, moment = plate.force[at], plate.moment[at]
-    offset = np.column_stack([-moment[:, 1], moment[:, 0]]) / force[:, 2:]
-    return np.asarray(plate.centre[:2] + offset)

@@ -79,7 +79,7 @@ def flagged_cycles(recording: Recording) -> tuple[GaitCycle, ...]:
     first: dict[Side, GaitCycle] = {}
     for cycle in gait_cycles(recording.events):
         label = f"{cycle.side[0].upper()}GroundReactionForce"
-        if label in recording.markers and cycle.side not in first:
+        if label in recording.stored and cycle.side not in first:
             start, off, end = (f + EVENT_SHIFT for f in (cycle.start, cycle.toe_off, cycle.end))
             first[cycle.side] = GaitCycle(cycle.side, start, off, end)
     return tuple(first.values())

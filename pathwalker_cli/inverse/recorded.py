@@ -32,11 +32,6 @@ def recorded(
     Speed is the mean over each recording; a step reaches from flat heel to flat heel; angles are
     those of complete gait cycles, unfiltered.
 
-    Args:
-        patient: The patient.
-        condition: What was worn.
-        trials: The trials.
-
     Raises:
         DataError: If the trials show no complete gait cycle or no step of a side.
     """

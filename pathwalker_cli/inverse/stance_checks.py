@@ -17,10 +17,7 @@ from pathwalker_cli.conventions import Side
 from pathwalker_cli.inverse.cycles import OTHER, Stance, single_support
 from pathwalker_cli.inverse.plate_checks import Footprint
 from pathwalker_cli.io.c3d_events import Event
-from pathwalker_cli.io.c3d_plates import ForcePlate
-
-LOADED: Final = 20.0
-"""Vertical force from which a plate counts as loaded [N]; about ten times its noise."""
+from pathwalker_cli.io.c3d_plates import LOADED, ForcePlate
 
 EDGE: Final = 3
 """Frames by which force and event may differ at either end of a stance."""
@@ -141,12 +138,6 @@ def _struck(plate: int, strike: int, side: Side, seen: Evidence) -> bool:
     moves on smoothly, the load jumps ahead: the second foot adds its load times the distance
     between the feet to the moment about where the load was before.  A foot that stands beside the
     plate does neither, however far the other one rolls.
-
-    Args:
-        plate: Index of the plate.
-        strike: Frame of the foot strike.
-        side: Side of the foot.
-        seen: Loads and feet.
     """
     rows = slice(max(strike - EDGE, 0), strike + 2 * EDGE + 1)
     load, point, foot = seen.up[rows, plate], seen.points[rows, plate], seen.feet[side]

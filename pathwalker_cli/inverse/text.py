@@ -1,8 +1,9 @@
-"""Tables of recorded gait for the terminal."""
+"""Recorded gait in words: tables for the terminal, notes, warnings, plain values."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,11 @@ from rich.table import Table
 from rich.text import Text
 
 from pathwalker_cli.conventions import SIDES, Side
+from pathwalker_cli.inverse.laboratory import SHOWN, differences, laboratory_rows
 from pathwalker_cli.inverse.residuals import COMPONENTS, ResidualTable
 from pathwalker_cli.inverse.strengths import StrengthTable
 from pathwalker_cli.inverse.trial import Trial
+from pathwalker_cli.patient import Patient
 
 
 def trials_renderable(trials: Iterable[Trial]) -> Table:
@@ -33,21 +36,42 @@ def trials_renderable(trials: Iterable[Trial]) -> Table:
     return table
 
 
-def dynamics_content(
-    trials: Iterable[Trial], tables: Iterable[ResidualTable], strengths: StrengthTable
-) -> dict[str, Any]:
-    """Return trials, mean residuals [N, N, N m] and strengths [N m] as plain values."""
+def trial_content(trial: Trial, patient: Patient, limit: float) -> dict[str, Any]:
+    """Return what is known of a trial, as plain values.
+
+    Args:
+        trial: The trial.
+        patient: The patient.
+        limit: Mean distance of the markers that is a warning, in body heights.
+    """
     return {
-        "trials": [
-            {
-                "condition": trial.condition,
-                "trial": trial.name,
-                "frames": int(trial.motion.time.size),
-                "strides": len(trial.cycles),
-                "measured_stances": _measured_sides(trial),
-            }
-            for trial in trials
-        ],
+        "condition": trial.condition,
+        "trial": trial.name,
+        "first_frame": trial.first_frame,
+        "frames": int(trial.motion.time.size),
+        "strides": len(trial.cycles),
+        "measured_stances": _measured_sides(trial),
+        "notes": list(trial.remarks),
+        "stances_not_measured": list(stance_notes(trial)),
+        "warnings": list(warnings(trial, patient.height, limit)),
+        "laboratory": [asdict(each) for each in differences(trial, patient.body_mass)],
+    }
+
+
+def laboratory_renderable(trials: Sequence[Trial], body_mass: float) -> Table | None:
+    """Return ours beside what files store of their laboratory's own model, None without any."""
+    heads = [f"{what}\n{side}" for what in SHOWN.values() for side in SIDES]
+    table = _table("Ours minus the angles and moments in the files", ("quantity",), heads)
+    for condition in dict.fromkeys(trial.condition for trial in trials):
+        own = (trial for trial in trials if trial.condition == condition)
+        for name, cells in laboratory_rows(d for t in own for d in differences(t, body_mass)):
+            table.add_row(Text(f"{condition}, {name}"), *cells)
+    return table if table.row_count else None
+
+
+def dynamics_content(tables: Iterable[ResidualTable], strengths: StrengthTable) -> dict[str, Any]:
+    """Return mean residuals [N, N, N m] and strengths [N m] as plain values."""
+    return {
         "mean_residuals": [
             {
                 "condition": table.condition,
@@ -117,52 +141,46 @@ def _table(
     return table
 
 
-def trial_warnings(trials: Iterable[Trial], height: float, share: float) -> tuple[str, ...]:
-    """Return a sentence for everything about the trials that the user should know.
+def warnings(trial: Trial, height: float, share: float) -> tuple[str, ...]:
+    """Return a sentence for everything about a trial that may be wrong.
 
     Args:
-        trials: The trials.
+        trial: The trial.
         height: Height of the patient [m].
         share: Mean distance of the markers that is a warning, as a share of the height.
     """
-    warnings = []
-    for trial in trials:
-        if trial.markers is not None and trial.markers.mean > share * height:
-            warnings.append(
-                f"{trial.name}: markers lie {1e3 * trial.markers.mean:.0f} mm from the walker on "
-                f"average (usual: below {1e3 * share * height:.0f} mm at a height of {height:g} "
-                "m): is this the patient's file, and the condition that was recorded?"
-            )
-        warnings += [f"{trial.name}: {doubt}" for doubt in trial.doubts]
-        for gap in trial.gaps:
-            if not gap.bridged:
-                first = trial.first_frame + gap.first
-                warnings.append(
-                    f"{trial.name}: marker {gap.marker} is not seen in frames {first} to "
-                    f"{first + gap.frames - 1}; the others carry the fit there"
-                )
-        if trial.markers is not None and trial.forces is None:
-            warnings.append(f"{trial.name}: has no force plates, so there are no forces")
-        if not trial.cycles:
-            warnings.append(f"{trial.name}: shows no complete gait cycle, so it is in no figure")
-    return tuple(warnings)
+    found = list(trial.doubts)
+    if trial.markers is not None and trial.markers.mean > share * height:
+        found.insert(
+            0,
+            f"markers lie {1e3 * trial.markers.mean:.0f} mm from the walker on average (usual: "
+            f"below {1e3 * share * height:.0f} mm at a height of {height:g} m): is this the "
+            "patient's file, and the condition that was recorded?",
+        )
+    found += [
+        f"marker {gap.marker} is not seen in frames {trial.first_frame + gap.first} to "
+        f"{trial.first_frame + gap.first + gap.frames - 1}; the others carry the fit there"
+        for gap in trial.gaps
+        if not gap.bridged
+    ]
+    if trial.markers is not None and trial.forces is None:
+        found.append("has no force plates, so there are no forces")
+    if not trial.cycles:
+        found.append("shows no complete gait cycle, so it is in no figure")
+    return tuple(found)
 
 
-def trial_notes(trials: Iterable[Trial]) -> tuple[str, ...]:
-    """Return sentences on how files were read, and why plates that felt a foot do not count.
+def stance_notes(trial: Trial) -> tuple[str, ...]:
+    """Return why stances do not count whose foot a plate felt, a sentence each.
 
     Frames are numbered as the recording program shows them.
     """
-    notes = []
-    for trial in trials:
-        notes += [f"{trial.name}: {remark}" for remark in trial.remarks]
-        notes += [
-            f"{trial.name}: {item.stance.side} stance from frame "
-            f"{trial.first_frame + item.stance.strike} is not measured: {item.reason}"
-            for item in trial.stances
-            if not item.measured and item.plate is not None
-        ]
-    return tuple(notes)
+    return tuple(
+        f"{item.stance.side} stance from frame {trial.first_frame + item.stance.strike} is not "
+        f"measured: {item.reason}"
+        for item in trial.stances
+        if not item.measured and item.plate is not None
+    )
 
 
 def _measured_sides(trial: Trial) -> list[Side]:

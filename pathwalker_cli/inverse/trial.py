@@ -9,6 +9,7 @@ from pathwalker_cli.inverse.cycles import GaitCycle
 from pathwalker_cli.inverse.kinematics import MarkerResiduals
 from pathwalker_cli.inverse.markers import Gap
 from pathwalker_cli.inverse.stance_checks import StanceForce
+from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.recordings import CompactRecording
 from pathwalker_cli.trajectory import Trajectory
 
@@ -25,8 +26,7 @@ class Trial(CompactRecording):
         markers: Distances of the markers from the walker, None without C3D.
         gaps: Gaps in the marker paths.
         published: Whether forces, torques and cycles are those of the article's own method.
-        first_frame: Number that the recording program gives the first frame.
-        remarks: How the file was read, a sentence each.
+        walk: Markers and filtered plates in every frame, x along the walk; None without C3D.
         doubts: What in the file may be wrong, a sentence each.
     """
 
@@ -37,9 +37,18 @@ class Trial(CompactRecording):
     markers: MarkerResiduals | None = None
     gaps: tuple[Gap, ...] = ()
     published: bool = False
-    first_frame: int = 0
-    remarks: tuple[str, ...] = ()
+    walk: Recording | None = None
     doubts: tuple[str, ...] = ()
+
+    @property
+    def first_frame(self) -> int:
+        """Number that the recording program gives the first frame."""
+        return self.walk.first_frame if self.walk else 0
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """How the file was read, a sentence each."""
+        return self.walk.remarks if self.walk else ()
 
     def measured(self, cycle: GaitCycle) -> bool:
         """Return whether the force of the stance that begins a cycle is known."""

@@ -71,11 +71,13 @@ def _walks(
     """
     found: list[tuple[Trial, Recording]] = []
     still: list[StandingError] = []
-    for path in c3d_files(config.c3d.of(condition)):
+    files = c3d_files(config.c3d.of(condition))
+    for path in files:
         if wanted(path.stem):
             progress(f"{condition} {path.stem}")
+            others = [file.stem for file in files if file != path]
             try:
-                found += c3d_trials(path, patient, condition, config)
+                found += c3d_trials(path, patient, condition, config, others)
             except StandingError as error:
                 still.append(error)
     if still and not found:
@@ -83,7 +85,8 @@ def _walks(
     if still:
         aside = tuple(f"{error.where} is set aside: its {error.what}" for error in still)
         first, recording = found[0]
-        found[0] = replace(first, remarks=(*first.remarks, *aside)), recording
+        walk = first.walk and replace(first.walk, remarks=(*first.remarks, *aside))
+        found[0] = replace(first, walk=walk), recording
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Final
 
@@ -36,7 +37,9 @@ class StandingError(DataError):
     """Nobody walks in a recording: it may be that of a pose."""
 
 
-def walks(recording: Recording, points: tuple[MarkerPoint, ...]) -> tuple[Recording, ...]:
+def walks(
+    recording: Recording, points: tuple[MarkerPoint, ...], taken: Collection[str] = ()
+) -> tuple[Recording, ...]:
     """Return every pass of a recording with +x along the walk and +z up.
 
     Frames at the ends that show too few markers are cut, the vertical is the axis along which the
@@ -45,6 +48,7 @@ def walks(recording: Recording, points: tuple[MarkerPoint, ...]) -> tuple[Record
     Args:
         recording: The recording in the laboratory's axes.
         points: Where its markers sit on the walker.
+        taken: Names of other recordings; passes are called otherwise.
 
     Raises:
         StandingError: If nobody walks.
@@ -64,7 +68,10 @@ def walks(recording: Recording, points: tuple[MarkerPoint, ...]) -> tuple[Record
     if len(runs) == 1:
         return (turned(recording, _heading(path)),)
     turns = ", ".join(str(run.start + recording.first_frame) for run in runs[1:])
-    names = [f"{recording.name}-{number}" for number in range(1, len(runs) + 1)]
+    stem, numbers = f"{recording.name}-", range(1, len(runs) + 1)
+    while any(f"{stem}{number}" in taken for number in numbers):
+        stem += "pass-"
+    names = [f"{stem}{number}" for number in numbers]
     remark = f"turns round before frame {turns}: its passes are {' and '.join(names)}"
     return tuple(
         replace(
@@ -93,6 +100,7 @@ def cut(recording: Recording, first: int, end: int) -> Recording:
             for plate in recording.plates
         ),
         first_frame=recording.first_frame + first,
+        stored={name: values[first:end] for name, values in recording.stored.items()},
     )
 
 

@@ -5,6 +5,7 @@ Positions keep the axes of the laboratory; `inverse.walk` turns them into the wa
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -23,6 +24,15 @@ LEAST_FRAMES: Final = 20
 
 _FARTHEST: Final = 1e5
 """Distance beyond which no laboratory reaches, even with mm taken for m [m]."""
+
+STORED: Final[Mapping[str, tuple[str, Mapping[str, float]]]] = {
+    "Angles": ("ANGLE_UNITS", {"deg": np.pi / 180.0, "rad": 1.0}),
+    "Moment": ("MOMENT_UNITS", {"nmm": 1e-3, "nm": 1.0}),
+}
+"""By kind of what a model computed: where its unit stands, and units in SI, the usual one first."""
+
+_MODELLED: Final = re.compile(r"(Angles?|Moment|Force|Power|GRF)(_.*)?$")
+"""Ends of labels of what a model computed: no places in the laboratory."""
 
 _LONGEST: Final = 60.0
 """Time to read a file [s]; a minute of walking takes less than a second."""
@@ -57,6 +67,10 @@ class Recording:
         subjects: Whom the file names before its markers.
         remarks: What a user should know about how the file was read, a sentence each.
         numbers: What the file says about the subject, e.g. Bodymass, as it stands there.
+        stored: What a model of the laboratory left in it, e.g. LKneeAngles, NaN where missing,
+            shape (n, 3) each: angles [rad], moments [N m, of many programs per kg], others as they
+            stand there.
+        source: The file, None of motion that was made.
     """
 
     name: str
@@ -70,6 +84,8 @@ class Recording:
     subjects: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     numbers: Mapping[str, float] = field(default_factory=dict)
+    stored: Mapping[str, np.ndarray] = field(default_factory=dict)
+    source: Path | None = None
 
     @property
     def time(self) -> np.ndarray:
@@ -103,7 +119,7 @@ def read_c3d(path: str | Path, subject: str | None = None) -> Recording:
         DataError: If the file is missing, is not C3D, or holds units that are not known.
     """
     path = Path(path)
-    content = _open(path)
+    content = open_c3d(path)
     parameters = content["parameters"]
     rate = float(_value(parameters, "POINT", "RATE", path)[0])
     first_frame = int(content["header"]["points"]["first_frame"]) + 1
@@ -116,7 +132,9 @@ def read_c3d(path: str | Path, subject: str | None = None) -> Recording:
     if subject is not None and subject not in subjects:
         what, allowed = f"names no subject {subject}", ", ".join(subjects) or "none is named"
         raise DataError(what, where=str(path), allowed=allowed)
-    own = [i for i, part in enumerate(parts) if subject in (None, part[0].strip())]
+    every = [i for i, part in enumerate(parts) if subject in (None, part[0].strip())]
+    kinds = {i: kind[1] for i in every if (kind := _MODELLED.search(parts[i][2].strip()))}
+    own = [i for i in every if i not in kinds]
     unit = _unit(parameters, path)
     samples = content["data"]["analogs"].shape[2]
     plates, remarks = read_plates(content, unit)
@@ -124,7 +142,7 @@ def read_c3d(path: str | Path, subject: str | None = None) -> Recording:
         name=path.stem,
         rate=rate,
         markers=tuple(parts[i][2].strip() for i in own),
-        positions=_positions(points[:, own], unit),
+        positions=_seen(points[:, own], unit),
         events=read_events(parameters.get("EVENT", {}), rate, first_frame, points.shape[2]),
         plates=plates,
         samples_per_frame=samples // points.shape[2] if points.shape[2] else 0,
@@ -132,11 +150,20 @@ def read_c3d(path: str | Path, subject: str | None = None) -> Recording:
         subjects=subjects,
         remarks=remarks,
         numbers=_numbers(parameters),
+        stored={
+            parts[i][2].strip(): _seen(points[:, [i]], _scale(kind, parameters))[:, 0]
+            for i, kind in kinds.items()
+        },
+        source=path,
     )
 
 
-def _open(path: Path) -> Any:
-    """Return ezc3d's view of a file."""
+def open_c3d(path: Path) -> Any:
+    """Return ezc3d's view of a file.
+
+    Raises:
+        DataError: If it cannot be read.
+    """
     if not path.is_file():
         raise DataError("no such recording", where=str(path), mend="check the path")
     try:
@@ -193,8 +220,20 @@ def _unit(parameters: Any, path: Path) -> float:
     return METRES[unit]
 
 
-def _positions(points: np.ndarray, unit: float) -> np.ndarray:
-    """Return positions [m], shape (n, m, 3); a point at exactly zero or far away was not seen."""
+def _scale(kind: str, parameters: Any) -> float:
+    """Return what makes values that a model computed SI; 1 where it does not matter."""
+    parameter, units = STORED.get(kind, ("", {"": 1.0}))
+    return units.get(unit_of(parameter, parameters["POINT"]), next(iter(units.values())))
+
+
+def unit_of(parameter: str, point: Mapping[str, Any]) -> str:
+    """Return the unit that a parameter of the group POINT names, in small letters; "" without."""
+    named = [*np.ravel(point[parameter]["value"] if parameter in point else ()), ""][0]
+    return str(named).strip().lower()
+
+
+def _seen(points: np.ndarray, unit: float) -> np.ndarray:
+    """Return points in SI units, shape (n, m, 3); NaN if exactly zero or far away: not seen."""
     positions = np.moveaxis(points[:3], (0, 1, 2), (2, 1, 0)) * unit
     seen = (np.abs(positions) < _FARTHEST).all(axis=2)  # NaN is not
     missing = ~seen | (positions == 0.0).all(axis=2)

@@ -21,6 +21,9 @@ from pathwalker_cli.io.c3d_events import continued
 METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 """Length of the units of C3D files [m]."""
 
+LOADED: Final = 20.0
+"""Vertical force from which a plate counts as loaded [N]; about ten times its noise."""
+
 _CHANNELS: Final = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 7: 8}
 """Channels of the types that are read."""
 
@@ -61,6 +64,20 @@ def plate_axes(corners: np.ndarray) -> np.ndarray:
         return np.stack([axis / np.linalg.norm(axis) for axis in (x, y, z)])
 
 
+def centre_of_pressure(load: ForcePlate, least_force: float) -> np.ndarray:
+    """Return where the force's line of action meets the plate's surface [m], shape (samples, 3).
+
+    Without a moment about a horizontal axis at the surface; NaN where the vertical force is below
+    `least_force` [N].
+    """
+    fz = load.force[:, 2]
+    mx, my, _ = load.moment.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        point = np.stack([-my / fz, mx / fz, np.zeros_like(fz)], axis=-1) + load.centre
+    point[fz < least_force] = np.nan
+    return point
+
+
 def read_plates(content: Any, unit: float) -> tuple[tuple[ForcePlate, ...], tuple[str, ...]]:
     """Return the plates that can be read, and a sentence about every other one.
 
@@ -72,7 +89,7 @@ def read_plates(content: Any, unit: float) -> tuple[tuple[ForcePlate, ...], tupl
     used = np.atleast_1d(group["USED"]["value"]) if "USED" in group else np.zeros(1)
     if not used.size or not int(used[0]) or not content["data"]["analogs"].size:
         return (), ()
-    analog, plates, remarks = _analog(content), [], []
+    analog, plates, remarks = analog_channels(content), [], []
     for index in range(int(used[0])):
         name = f"plate {index + 1}"
         kinds = np.atleast_1d(group["TYPE"]["value"])
@@ -181,7 +198,7 @@ def analog_offset_error(offset: np.ndarray, scale: np.ndarray, unsigned: bool) -
     return (true - np.abs(offset)) * scale
 
 
-def _analog(content: Any) -> np.ndarray:
+def analog_channels(content: Any) -> np.ndarray:
     """Return the analog channels in physical units, shape (samples, channels)."""
     group = content["parameters"]["ANALOG"]
     channels = np.array(content["data"]["analogs"][0].T, dtype=float)

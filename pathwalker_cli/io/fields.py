@@ -119,6 +119,10 @@ class Sides(YamlModel, Generic[T]):
             return value
         return value if isinstance(value, cls) else {"right": value, "left": value}
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel by the type of the values: the class of a pair has no name of its own."""
+        return _pair, (side_type(type(self)), self.right, self.left)
+
     def __str__(self) -> str:
         """Return the one value of both sides, or both as a file gives them."""
         both = str(self.right), str(self.left)
@@ -127,6 +131,11 @@ class Sides(YamlModel, Generic[T]):
     def __getitem__(self, side: str) -> T:
         """Return the value of "right" or "left"."""
         return {"right": self.right, "left": self.left}[side]
+
+
+def _pair(of: Any, right: Any, left: Any) -> Sides[Any]:
+    """Return a pair of checked values of a type."""
+    return Sides[of].model_construct(right=right, left=left)
 
 
 _KINDS: Final[dict[Any, str]] = {

@@ -1,22 +1,21 @@
-"""OpenSim's text tables: .mot for motions and ground forces, .sto for joint torques.
+"""OpenSim's text tables: .mot for motions and forces, .sto for joint torques, .trc for markers.
 
-Ground forces follow OpenSim's axes (x forward, y up, z to the right); coordinates keep the names
-and signs of `conventions`.
+Forces and markers follow OpenSim's axes (x forward, y up, z to the right); coordinates keep the
+names and signs of `conventions`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from pathwalker_cli.conventions import SIDES, SUFFIX, TRANSLATIONS
-from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.atomic import atomic_open
+from pathwalker_cli.io.c3d import Recording
+from pathwalker_cli.io.c3d_plates import LOADED, ForcePlate, centre_of_pressure
 from pathwalker_cli.trajectory import Trajectory
-
-_END: Final = "endheader"
 
 
 def write_opensim(path: str | Path, table: Trajectory, digits: int = 8) -> None:
@@ -33,7 +32,7 @@ def write_opensim(path: str | Path, table: Trajectory, digits: int = 8) -> None:
         f"nRows={table.time.size}",
         f"nColumns={len(table.names) + 1}",
         "inDegrees=no",
-        _END,
+        "endheader",
         "\t".join(("time", *table.names)),
     ]
     rows = np.column_stack([table.time, table.values])
@@ -41,47 +40,6 @@ def write_opensim(path: str | Path, table: Trajectory, digits: int = 8) -> None:
         file.write("\n".join(header) + "\n")
         for row in rows:
             file.write("\t".join(f"{value:.{digits}g}" for value in row) + "\n")
-
-
-def read_opensim(path: str | Path) -> Trajectory:
-    """Read a table written by OpenSim or by `write_opensim`; units are unknown and left empty.
-
-    Raises:
-        DataError: If the file is no such table, is in degrees, or ends early.
-    """
-    path = Path(path)
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as problem:
-        raise DataError(f"cannot be read: {problem}", where=str(path)) from None
-    stripped = [line.strip() for line in lines]
-    if _END not in stripped or stripped.index(_END) + 1 >= len(lines):
-        raise DataError(f"has no line '{_END}' with column names below", where=str(path))
-    end = stripped.index(_END)
-    pairs = (line.partition("=") for line in stripped[:end])
-    entries = {key: value for key, equals, value in pairs if equals}
-    if entries.get("inDegrees", "no") != "no":
-        raise DataError("is in degrees", where=str(path), allowed="inDegrees=no")
-    names = tuple(lines[end + 1].split())
-    values = _numbers(lines[end + 2 :], len(names), path)
-    rows = entries.get("nRows", str(len(values)))
-    if rows.strip() != str(len(values)):
-        raise DataError(f"has {len(values)} rows", where=str(path), allowed=f"nRows={rows}")
-    try:
-        return Trajectory(values[:, 0], names[1:], values[:, 1:], ("",) * (len(names) - 1))
-    except ValueError as problem:
-        raise DataError(str(problem), where=str(path)) from None
-
-
-def _numbers(lines: list[str], columns: int, path: Path) -> np.ndarray:
-    """Return the rows below the column names, shape (n, columns)."""
-    try:
-        rows = [[float(cell) for cell in line.split()] for line in lines if line.strip()]
-    except ValueError as problem:
-        raise DataError(f"holds a cell that is no number: {problem}", where=str(path)) from None
-    if not rows or {len(row) for row in rows} != {columns}:
-        raise DataError("has rows of another length", where=str(path), allowed=f"{columns} cells")
-    return np.array(rows)
 
 
 def force_table(forces: Trajectory) -> Trajectory:
@@ -106,6 +64,68 @@ def force_table(forces: Trajectory) -> Trajectory:
         columns += [forward, up, zero, point, *[zero] * 5]
     units = ("N", "N", "N", "m", "m", "m", "N m", "N m", "N m") * 2
     return Trajectory(forces.time, tuple(names), np.column_stack(columns), units)
+
+
+def opensim_axes(values: np.ndarray) -> np.ndarray:
+    """Return vectors (..., 3) forward, left, up in OpenSim's axes: forward, up, right."""
+    return values[..., [0, 2, 1]] * [1.0, 1.0, -1.0] + 0.0  # no -0.0
+
+
+def plate_table(time: np.ndarray, plates: Sequence[ForcePlate]) -> Trajectory:
+    """Return the loads of plates as OpenSim's external loads take them.
+
+    Of each plate the force `plate_1_vx`, the point where it acts on the surface `plate_1_px` and
+    the moment about the vertical through there `plate_1_torque_y`, with their y and z; a plate
+    without load acts at the middle of its surface.
+
+    Args:
+        time: Time of the frames [s], shape (n,).
+        plates: The plates, x along the walk and z up, with a load a frame.
+    """
+    names: list[str] = []
+    columns: list[np.ndarray] = []
+    for plate in plates:
+        stem, force, about = plate.name.replace(" ", "_"), plate.force, np.zeros_like(plate.force)
+        point = centre_of_pressure(plate, LOADED)
+        point = np.where(np.isfinite(point), point, plate.centre)
+        about[:, 2] = (plate.moment - np.cross(point - plate.centre, force))[:, 2]
+        for part, values in (("v", force), ("p", point), ("torque_", about)):
+            names += [f"{stem}_{part}{axis}" for axis in "xyz"]
+            columns.append(opensim_axes(values))
+    units = ("N", "N", "N", "m", "m", "m", "N m", "N m", "N m") * len(plates)
+    return Trajectory(time, tuple(names), np.hstack(columns), units)
+
+
+def write_trc(path: str | Path, recording: Recording) -> None:
+    """Write the markers that some frame shows as .trc [mm]; where one is not seen, cells are empty.
+
+    Args:
+        path: The file.
+        recording: The markers, x along the walk and z up.
+    """
+    seen = np.isfinite(recording.positions[..., 0]).any(axis=0)
+    names = [name for name, there in zip(recording.markers, seen, strict=True) if there]
+    positions = 1e3 * opensim_axes(recording.positions[:, seen])
+    frames, rate, first = len(positions), f"{recording.rate:g}", recording.first_frame
+    facts = {
+        "DataRate": rate, "CameraRate": rate, "NumFrames": frames, "NumMarkers": len(names),
+        "Units": "mm", "OrigDataRate": rate, "OrigDataStartFrame": first, "OrigNumFrames": frames,
+    }  # fmt: skip
+    axes = (f"{axis}{number}" for number in range(1, len(names) + 1) for axis in "XYZ")
+    header = [
+        ("PathFileType", "4", "(X/Y/Z)", Path(path).name),
+        facts,
+        map(str, facts.values()),
+        ("Frame#", "Time", *(cell for name in names for cell in (name, "", ""))),
+        ("", "", *axes),
+        (),
+    ]
+    with atomic_open(path) as file:
+        for line in header:
+            file.write("\t".join(line) + "\n")
+        for row, (time, values) in enumerate(zip(recording.time, positions, strict=True), first):
+            cells = (f"{x:.4f}" if np.isfinite(x) else "" for x in values.ravel())
+            file.write("\t".join((str(row), f"{time:.6f}", *cells)) + "\n")
 
 
 def torque_table(tau: Trajectory) -> Trajectory:

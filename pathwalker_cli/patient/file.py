@@ -119,11 +119,6 @@ class Patient(YamlModel):
             )
         return self
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Travel to other processes as JSON: the classes of pairs of sides have no name there."""
-        content = self.model_dump_json(exclude_none=True)
-        return _travelled, (content, self._origin, self._changes)
-
     @property
     def source(self) -> Path | None:
         """The file this was read from."""
@@ -278,13 +273,6 @@ class Patient(YamlModel):
     def _lacks(self, key: str, mend: str) -> PatientError:
         where = str(self.source) if self.source else f"patient {self.id}"
         return PatientError(f"{key} is not given", where=where, mend=mend)
-
-
-def _travelled(content: str, origin: _Origin, changes: tuple[str, ...]) -> Patient:
-    """Return a patient that comes from another process."""
-    patient = Patient.model_validate_json(content, strict=True)
-    patient._origin, patient._changes = origin, changes
-    return patient
 
 
 def shipped_patients() -> tuple[str, ...]:

@@ -6,16 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
-import numpy as np
-
 from pathwalker_cli.conventions import SIDES, SUFFIX
-from pathwalker_cli.evaluation.norms import profile_score
-from pathwalker_cli.evaluation.recorded import Spread, spread
+from pathwalker_cli.evaluation.recorded import Spread
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.report.content import Row, Section, Table
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.stride.measure import Measure
-from pathwalker_cli.stride.measures import expanded, measure_of
+from pathwalker_cli.stride.measures import expanded
 from pathwalker_cli.studies.verdict import SHARE
 
 Judgement = Literal["better", "worse", "same"]
@@ -25,13 +22,15 @@ JUDGED: Final[Mapping[str, bool]] = {
     "step_length_*": True,
     "min_stance_knee_flexion_*": False,
     "effort_per_distance": False,
+    "gait_profile_score": False,
 }
 """What is judged, in order, and whether more of it is better."""
 
-_PROFILE: Final = Measure(
-    "profile_score", "distance from typical walking (Gait Profile Score, sagittal)", "rad",
-    "root mean square difference to typical children at the same speed", None,
-)  # fmt: skip
+_PLAIN: Final = {
+    "least stance knee flexion": "crouch: least knee flexion in stance",
+    "sagittal Gait Profile Score": "distance from typical walking (sagittal Gait Profile Score)",
+}
+"""What people call some of them."""
 
 MARKS: Final[Mapping[Judgement, str]] = {
     "better": "▲ better", "worse": "▼ worse", "same": "= same",
@@ -88,8 +87,9 @@ def outcomes(runs: Sequence[ReportRun]) -> tuple[Outcome, ...]:
                     if row is not None and row.recorded is not None
                 }
                 held = tuple(_is_held(run, key) for run in runs)
-                found.append(Outcome(measure_of(key), more, tuple(values), recorded, held))
-    return (*found, _profile(runs))
+                measure = next(row.measure for row in rows if row is not None)
+                found.append(Outcome(measure, more, tuple(values), recorded, held))
+    return tuple(found)
 
 
 def _is_held(run: ReportRun, key: str) -> bool:
@@ -101,19 +101,6 @@ def _holds(bound: ActiveBound, key: str) -> bool:
     """Return whether a bound is one of the measure itself."""
     knees = {f"knee_{SUFFIX[side]}": f"min_stance_knee_flexion_{side}" for side in SIDES}
     return key == (knees.get(bound.name) if bound.side == "lower" else None) or key == bound.name
-
-
-def _profile(runs: Sequence[ReportRun]) -> Outcome:
-    """Return how far the gaits are from that of typical children."""
-    values = [float(np.deg2rad(profile_score([run.evaluation.gait]))) for run in runs]
-    recorded: dict[str, Spread] = {}
-    for run in runs:
-        behind = run.evaluation.recorded
-        cycles = () if behind is None else behind.cycles
-        scores = spread(np.deg2rad(profile_score([cycle])) for cycle in cycles)
-        if scores is not None:
-            recorded[run.run.config.condition] = scores
-    return Outcome(_PROFILE, False, tuple(values), recorded, (False,) * len(runs))
 
 
 def base_of(runs: Sequence[ReportRun]) -> int | None:
@@ -150,9 +137,9 @@ def _outcome_row(
     width: int,
 ) -> Row:
     measure = each.measure
-    label = measure.label.replace(
-        "least stance knee flexion", "crouch: least knee flexion in stance"
-    )
+    label = measure.label
+    for name, plain in _PLAIN.items():
+        label = label.replace(name, plain)
     cells = [label, measure.shown_unit]
     for i in range(len(runs)):
         cells.append(short(measure, each.values[i]) + "*" * each.set_by_bound[i])

@@ -9,7 +9,8 @@ from typing import Any, Final
 
 from pathwalker_cli.conventions import CONDITIONS, SIDES, SUFFIX, Condition
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.files import ORIGIN
+from pathwalker_cli.inverse.files import ORIGIN, READING
+from pathwalker_cli.inverse.laboratory import SHOWN, Difference, laboratory_rows
 from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.inverse.trials import read_trials
 from pathwalker_cli.io.csv_file import number, read_rows
@@ -91,6 +92,11 @@ def _sections(folder: Path, origin: Mapping[str, Any], index: int) -> list[Secti
     if (folder / "residuals.csv").is_file():
         rows = read_rows(folder / "residuals.csv", _RESIDUALS)
         sections.append(Section(f"Pelvis residuals, {who}", tables=(_residual_table(rows),)))
+    try:
+        sections += _readings(folder, who)
+    except (LookupError, TypeError, ValueError) as problem:
+        what = f"holds a *{READING} that cannot be used: {problem}"
+        raise DataError(what, where=str(folder), mend="compute it again") from None
     notes = [str(note) for note in origin.get("notes") or ()]
     versions = ", ".join(f"{n} {v}" for n, v in (origin.get("versions") or {}).items())
     lines = (*(f"{note}." for note in notes), *([f"Versions: {versions}."] if versions else []))
@@ -139,6 +145,28 @@ def _torques(
 def _measured(trial: Trial) -> bool:
     """Return whether some complete gait cycle begins with a measured stance."""
     return trial.tau is not None and any(map(trial.measured, trial.cycles))
+
+
+def _readings(folder: Path, who: str) -> list[Section]:
+    """Return how C3D files were read, and ours beside their laboratory's angles and moments."""
+    found = [read_json(path) for path in sorted(folder.glob(f"*/*{READING}"))]
+    said = tuple(
+        f"{reading['condition']}, {reading['trial']}: {sentence}."
+        for reading in found
+        for sentence in (*reading.get("notes", ()), *reading.get("warnings", ()))
+    )
+    tables = [
+        Table(("", *(f"{what}, {side}" for what in SHOWN.values() for side in SIDES)),
+              tuple(Row((f"{condition}, {name}", *cells)) for name, cells in rows))
+        for condition in CONDITIONS
+        if (rows := laboratory_rows(
+            Difference(**each) for reading in found if reading["condition"] == condition
+            for each in reading.get("laboratory", ())
+        ))
+    ]  # fmt: skip
+    sections = [Section(f"Beside the laboratory's own model, {who}", tables=tuple(tables))]
+    read = [Section(f"How the files were read, {who}", said)]
+    return sections * bool(tables) + read * bool(said)
 
 
 def _strength_table(rows: Rows) -> Table:

@@ -105,6 +105,8 @@ def summary_rows(
         if (value := metrics.get(name)) is not None:
             text = f"{value:.1f} N m/rad ({np.deg2rad(value):.2f} N m/deg)"
             rows.append((measure_of(name).label, text))
+    if metrics.get("peak_shin_force_right") is not None:
+        rows.append(("cuffs press at most", ", ".join(_cuff(metrics, side) for side in SIDES)))
     told = {key for m in TABLES["summary"] for key in expanded(m)}
     for measure in measures_in("summary"):
         if measure.key not in told and measure.key in metrics:
@@ -118,6 +120,13 @@ def _landing(metrics: Mapping[str, Any], side: str) -> str:
     index = metrics[f"strike_index_{side}"]
     part = "rearfoot" if index < 1 / 3 else "midfoot" if index < 2 / 3 else "forefoot"
     return f"{side} {part} ({100 * index:.0f} % of heel to toe)"
+
+
+def _cuff(metrics: Mapping[str, Any], side: str) -> str:
+    """Return the largest forces of a cuff and the pressure under it."""
+    shin, calf = (metrics[f"peak_{part}_force_{side}"] for part in ("shin", "calf"))
+    pressure = metrics[f"peak_cuff_pressure_{side}"] / 1000.0
+    return f"{side} shin {shin:.0f} N, calf {calf:.0f} N ({pressure:.1f} kPa)"
 
 
 def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = (), width: int = 0) -> str:

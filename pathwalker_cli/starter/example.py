@@ -80,12 +80,7 @@ def write_example(folder: Path, patient: Patient, conditions: tuple[Condition, .
 
 
 def made_recordings(patient: Patient, condition: Condition) -> Iterator[Recording]:
-    """Yield recordings of a patient who walks as another child was recorded.
-
-    Args:
-        patient: Who walks.
-        condition: What is worn.
-    """
+    """Yield recordings of a patient who walks as another child was recorded."""
     source = load_patient(SOURCE)
     child, other = _Body.of(patient, condition), _Body.of(source, condition)
     points = marker_points(load_marker_set(), patient, condition)

@@ -16,6 +16,7 @@ WALK: Final = "Steps and time"
 KNEE: Final = "Least knee flexion in stance"
 TRIAL: Final = "Joint angles, RMS difference to one trial at equal time"
 CYCLE: Final = "Joint angles, RMS difference to the recorded mean over the gait cycle"
+TYPICAL: Final = "Movement Analysis Profile and Gait Profile Score, sagittal part"
 FORCE: Final = "Ground reaction forces"
 LOADS: Final = "Loads"
 ANKLE: Final = "Net ankle torque in stance, muscles and orthosis"
@@ -24,8 +25,8 @@ WORK: Final = "Work over the stride"
 EFFORT: Final = "Effort and springs"
 SOLUTION: Final = "Solution"
 FURTHER: Final = "Further measures"
-SECTIONS: Final = (WALK, KNEE, TRIAL, CYCLE, FORCE, LOADS, ANKLE, MUSCLE, WORK, EFFORT, SOLUTION,
-                   FURTHER)  # fmt: skip
+SECTIONS: Final = (WALK, KNEE, TRIAL, CYCLE, TYPICAL, FORCE, LOADS, ANKLE, MUSCLE, WORK, EFFORT,
+                   SOLUTION, FURTHER)  # fmt: skip
 """Headings of tables, in order."""
 
 _DIGITS: Final = {"m/s": 3, "m": 3, "s": 3, "1": 3, "rad": 2, "rad^2": 3, "body weights": 2, "N": 1,

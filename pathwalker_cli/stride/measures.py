@@ -2,6 +2,9 @@
 
 A new measure is one entry of `REGISTRY`.  Without further words it stands in `metrics.json`, in
 every table, among the sensitivities, and on the pages of the reference.
+
+References:
+    Hof (1996) Gait & Posture 4, 222-223: numbers over leg length.
 """
 
 from __future__ import annotations
@@ -13,7 +16,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, GENERATORS, ROOT, SIDES, SUFFIX, Side
+from pathwalker_cli.conventions import (
+    COORDINATES,
+    GENERATORS,
+    GRAVITY,
+    ROOT,
+    SIDES,
+    SUFFIX,
+    Side,
+)
 from pathwalker_cli.stride.measure import (
     ANKLE,
     EFFORT,
@@ -186,6 +197,18 @@ REGISTRY: tuple[Measure, ...] = (
     *per_side("step_length_*", "step length, *", "m",
               "from the other foot's heel to this foot's heel, both flat", Stride.step_length,
               short="step *", section=WALK, part="step"),
+    Measure("normalised_walking_speed", "normalised walking speed", "1",
+            "over the root of gravity times leg length (Hof 1996)",
+            lambda s: s.walking_speed / np.sqrt(GRAVITY * s.walker.leg_length),
+            "normalised speed", section=WALK, part="recording", kept=False),
+    Measure("normalised_cadence", "normalised cadence", "1",
+            "steps per second over the root of gravity over leg length (Hof 1996)",
+            lambda s: 2.0 / s.duration / np.sqrt(GRAVITY / s.walker.leg_length),
+            "normalised cadence", section=WALK, kept=False),
+    *per_side("normalised_step_length_*", "normalised step length, *", "1",
+              "over leg length (Hof 1996)",
+              lambda s, side: s.step_length(side) / s.walker.leg_length, "normalised step, *",
+              section=WALK, part="step", kept=False),
     *per_side("stance_share_*", "stance share, *", "1",
               "share of the stride with the foot on the ground", _stance_share, section=WALK),
     *per_side("stance_time_*", "stance time, *", "s", "time from foot strike to toe-off",
@@ -285,6 +308,7 @@ REGISTRY: tuple[Measure, ...] = (
 """All measures, in the order of `metrics.json`."""
 
 _SPRINGS: Final = ("dorsiflexion_stiffness_*", "plantarflexion_stiffness_*")
+_NORMALISED: Final = ("normalised_walking_speed", "normalised_step_length_*", "normalised_cadence")
 _CROUCH: Final = "min_stance_knee_flexion_*"
 _TIMES: Final = ("stance_share_*", "stance_time_*", "swing_share_*", "swing_time_*",
                  "double_support_share", "double_support_time", _CROUCH,
@@ -293,19 +317,20 @@ _TIMES: Final = ("stance_share_*", "stance_time_*", "swing_share_*", "swing_time
 TABLES: Final[Mapping[str, Sequence[str]]] = {
     "summary": ("walking_speed", "distance", "stride_time", "step_length_*", _CROUCH, *_SPRINGS),
     "evaluate": (
-        "walking_speed", "step_length_*", "stride_time", "cadence", *_TIMES,
+        "walking_speed", "step_length_*", "stride_time", "cadence", *_NORMALISED, *_TIMES,
         "ankle_torque_slope_stance_*", "peak_net_ankle_torque_*",
         *(f"{kind}_ankle_extension_{name}_*" for name in ("torque", "activation")
           for kind in ("peak", "mean")),
         "effort_per_distance", *_SPRINGS,
     ),
-    "report": ("walking_speed", "step_length_*", "cadence", "stride_time",
+    "report": ("walking_speed", "step_length_*", "cadence", "stride_time", *_NORMALISED,
                *(key for key in _TIMES if key != "swing_share_*"), "effort_per_distance"),
     "compare": (
         "walking_speed", "step_length_*", "stride_time", "cadence", "stance_share_*",
         "swing_share_*", "double_support_share", _CROUCH, "peak_vertical_force_*_body_weights",
         "ankle_torque_slope_*", "max_friction_ratio_*", "positive_muscle_work",
         "negative_muscle_work", "positive_orthosis_work", "negative_orthosis_work",
+        "peak_shin_force_*", "peak_calf_force_*", "peak_cuff_pressure_*",
         "effort_per_distance", *_SPRINGS, "cost",
     ),
     "batch": ("cost", "walking_speed", "step_length_*", _CROUCH, *_SPRINGS,
