@@ -126,7 +126,7 @@ def write_child(case: Case, folder: Path) -> None:
         round(usual.body_mass * kind.mass, 1),
         round(usual.height * kind.height, 2),
     )
-    texts = folder_files(child, worn=True, example=False)
+    texts = folder_files(child, True, False)
     patient, orthosis = (yaml.safe_load(texts[f"{name}.yaml"]) for name in ("patient", "orthosis"))
     for name in patient["strengths"]:
         whole = healthy_strength(name, usual.body_mass, usual.height)

@@ -153,8 +153,8 @@ BAD_CONFIGS: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
         ("bounds.joint_range_margin", "is 12 rad", "0 to 1.5 rad", "is it in degrees?"),
     ),
     "unit in the number": (
-        lambda f: config_of(f, bounds={"joint_range_margin": "12 deg"}),
-        ("bounds.joint_range_margin", "not a number in rad"),
+        lambda f: config_of(f, bounds={"joint_range_margin": "12 grad"}),
+        ("bounds.joint_range_margin", "not a number in rad", "or a number with deg"),
     ),
     "wrong sign": (
         lambda f: patient_of(f, "orthosis.dorsiflexion_stop", 0.13),

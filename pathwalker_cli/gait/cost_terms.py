@@ -53,9 +53,10 @@ def goal_values(
 
     Args:
         motion: A whole stride.
-        walker: Who walks.
+        walker: Who walks; its unknowns take the values of the motion's parameters.
         comfort_ranges: Comfortable range by coordinate [rad].
     """
+    walker = walker.with_parameters(motion.parameters)
     names = tuple(name for name in GOALS if name != "discomfort" or comfort_ranges)
     costs = Costs(names, comfort_ranges=comfort_ranges)
     gains = sum(_goal_gains(phase, costs, walker).sum(axis=0) for phase in motion.phases)
@@ -66,6 +67,7 @@ def goal_values(
 
 def with_goal_costs(motion: PhasedMotion, costs: Costs, walker: Walker) -> PhasedMotion:
     """Return a motion, of a problem with any goals, whose integrals are those of these goals."""
+    walker = walker.with_parameters(motion.parameters)
     base = sum(len(term.integrals) for term in BASE.values())
     phases, reached = [], np.zeros(len(costs.integrals) - base)
     for phase in motion.phases:
