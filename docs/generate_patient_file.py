@@ -29,7 +29,8 @@ the meanings in the script, not this. -->
 Every key of a patient's YAML file. [Your own patient](own-patient.md) tells how to write one; the shipped
 `patient_data/sreenivasa2017-patient/patient.yaml` is a complete example.
 
-Units are SI and radians and are never written beside a number. Angles are positive in hip extension, knee
+Units are SI and radians and are not written beside a number, but for angles in degrees (`7.5 deg`) and stiffnesses per degree
+(`1.6 N m/deg`). Angles are positive in hip extension, knee
 flexion and ankle plantarflexion ([conventions](conventions.md)). Where the type says *per side*, one value
 counts for both sides, and `{right: 18.6, left: 30.4}` tells them apart. Unknown keys and numbers outside their
 range are refused with one sentence that names file, line and key. `null` means left out.

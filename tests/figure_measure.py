@@ -1,4 +1,4 @@
-"""What is wrong with the text of a figure once it is printed as wide as a column."""
+"""What is wrong with the text of a figure once it is printed as wide as it is meant to be."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from matplotlib.text import Text
 
 POINT = 72.0
 """Points of an inch [pt]."""
-WIDTH = 85.0 / 25.4
-"""Width of a column [in]."""
+WIDTHS = (47.0 / 25.4, 85.0 / 25.4, 188.0 / 25.4)
+"""Widths at which figures are printed: a quarter of a page, a column, a page [in]."""
 LEAST = 6.0
 """Smallest text that can be read in print [pt]."""
 INDEX = 0.7
@@ -30,7 +30,8 @@ def complaints(figure: Figure) -> list[str]:
     """
     figure.draw_without_rendering()  # texts know their places for the dots per inch of the figure
     shown = [text for text in _texts(figure) if text.get_visible() and text.get_text().strip()]
-    scale = WIDTH / figure.get_figwidth()
+    width = figure.get_figwidth()
+    scale = min(WIDTHS, key=lambda printed: abs(printed - width)) / width
     sizes = [(text, scale * _size(text)) for text in shown]
     found = [f"{text.get_text()!r} is {size:.1f} pt" for text, size in sizes if size < LEAST]
     boxes = [(text, text.get_window_extent()) for text in shown]

@@ -28,6 +28,7 @@ from pathwalker_cli.animation.drawing import (
 from pathwalker_cli.animation.film import film_rate
 from pathwalker_cli.animation.frames import GaitFrames, gait_frames
 from pathwalker_cli.animation.html import html_page
+from pathwalker_cli.animation.look import pace
 from pathwalker_cli.animation.recorded import recorded_frames
 from pathwalker_cli.animation.viewer import poses, walker_geometry
 from pathwalker_cli.cli import cli
@@ -495,3 +496,13 @@ def test_the_view_plays_a_stride(runs: Path) -> None:
     result = run("view", runs / "mapd-orthosis", "--no-open", "--strides", 1)
     assert result.exit_code == 0, result.output
     assert re.search(r"http://127\.0\.0\.1:\d+", result.output)
+
+
+@pytest.mark.parametrize(
+    ("duration", "words"), [(1.0, "in its own time"), (1.14, "14 % faster than it walks"),
+                            (0.8, "25 % slower than it walks")],
+)  # fmt: skip
+def test_the_clock_of_a_second_walker_is_told(duration: float, words: str) -> None:
+    first = gait_frames(stylised_series("barefoot"), "a", "mapd-barefoot", 4)
+    second = replace(first, name="b", duration=duration * first.duration)
+    assert pace([first, second]).endswith(f"at the pace of a: b is shown {words}.")

@@ -159,6 +159,10 @@ def test_json_is_one_document(here: Path) -> None:
     assert content["ok"] is True
     first, second = content["configs"]
     assert first["expected_seconds"]["least"] < first["expected_seconds"]["likely"]
+    words = ["check", "mapd-orthosis", "--set", "verdict=false", "--json"]
+    (unjudged,) = json.loads(CliRunner().invoke(cli, words).stdout)["configs"]
+    share = unjudged["expected_seconds"]["likely"] / first["expected_seconds"]["likely"]
+    assert share < 0.7, "judging the springs takes its time too"
     assert first["bounds"]["walking_speed"].startswith("at least 0.636 m/s")
     assert (second["kind"], second["solves"]) == ("perturbation", 4)
 

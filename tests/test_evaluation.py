@@ -242,7 +242,7 @@ def test_the_line_of_a_spring_has_its_stiffness() -> None:
 
 def test_a_spread_knows_what_lies_inside() -> None:
     found = spread([1.0, 2.0, 6.0])
-    assert found == Spread(3.0, 1.0, 6.0, 3)
+    assert found == Spread(3.0, 1.0, 6.0, 3, pytest.approx(7.0**0.5))
     assert [found.position(x) for x in (0.9, 1.0, 6.0, 6.1)] == ["below", "in", "in", "above"]
     assert spread([]) is None
 

@@ -12,8 +12,8 @@ import matplotlib as mpl
 import pytest
 
 import pathwalker_cli
-from figure_measure import LEAST, WIDTH, complaints
-from pathwalker_cli.stride.figures.style import COLUMN, STYLE, TEXT, dress, new_figure
+from figure_measure import LEAST, WIDTHS, complaints
+from pathwalker_cli.stride.figures.style import COLUMN, PAGE, PANEL, STYLE, TEXT, dress, new_figure
 
 PACKAGE = Path(pathwalker_cli.__file__).parent
 FOR_SCREENS = ("animation/film.py",)
@@ -29,10 +29,11 @@ def calls() -> Iterator[tuple[str, ast.Call]]:
             yield from ((name, node) for node in ast.walk(tree) if isinstance(node, ast.Call))
 
 
-def test_all_figures_are_as_wide_as_a_column() -> None:
+def test_all_figures_are_as_wide_as_a_column_a_page_or_its_quarter() -> None:
     made = {name for name, call in calls() if ast.unparse(call.func) == "Figure"}
     assert made == {"stride/figures/style.py"}, "figures are made by `new_figure`"
-    assert new_figure(2.0).get_figwidth() == COLUMN == pytest.approx(WIDTH, abs=0.01)
+    assert new_figure(2.0).get_figwidth() == COLUMN
+    assert pytest.approx(WIDTHS, abs=0.01) == (PANEL, COLUMN, PAGE)
 
 
 def test_no_text_is_set_smaller_than_can_be_read() -> None:
@@ -71,9 +72,9 @@ def test_what_cannot_be_read_is_found() -> None:
             saved(**changes)
 
 
-def test_a_wide_figure_is_measured_at_the_width_of_a_column() -> None:
+def test_a_wide_figure_is_measured_at_the_width_of_a_page() -> None:
     with mpl.rc_context(STYLE):
         figure = new_figure(2.0)
-        figure.set_figwidth(2.0 * COLUMN)
+        figure.set_figwidth(2.0 * PAGE)
         figure.text(0.5, 0.5, "words", fontsize=8.0)
     assert complaints(figure) == ["'words' is 4.0 pt"]

@@ -31,6 +31,7 @@ from pathwalker_cli.starter import example
 from pathwalker_cli.starter.child import made_child
 from pathwalker_cli.starter.configs import WIDTH
 from pathwalker_cli.starter.files import explained_keys, folder_files, next_steps
+from pathwalker_cli.starter.seen import Seen
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.landscape import LandscapeStudy
 from pathwalker_cli.studies.perturbation import PerturbationStudy
@@ -117,7 +118,7 @@ def test_every_key_of_patient_and_orthosis_is_explained() -> None:
 
 
 def test_units_and_ranges_come_from_the_models() -> None:
-    files = folder_files(made_child("child"), True, False)
+    files = folder_files(made_child("child"), Seen(), False)
     text = " ".join(files["patient.yaml"].replace("#", " ").split())
     assert "without orthoses. [kg], 5 to 150 body_mass: 29" in text
     assert "Hip extensors. [N m], 0.1 to 500 hip_extension:" in text
@@ -126,7 +127,7 @@ def test_units_and_ranges_come_from_the_models() -> None:
 
 
 def test_comments_of_configs_are_those_of_the_shipped_ones() -> None:
-    files = folder_files(made_child("child"), True, False)
+    files = folder_files(made_child("child"), Seen(), False)
     text = " ".join(files["mapd-orthosis.yaml"].replace("#", " ").split())
     why = reasons(shipped("configs") / "mapd-orthosis.yaml")
     for key in ("bounds.least_walking_speed", "bounds.distance", "starts", "start.knee_flexion"):
@@ -136,7 +137,9 @@ def test_comments_of_configs_are_those_of_the_shipped_ones() -> None:
 @pytest.mark.parametrize("worn", [True, False])
 @pytest.mark.parametrize("made", [True, False])
 def test_no_line_is_wider_than_a_terminal(worn: bool, made: bool) -> None:
-    for name, text in folder_files(made_child("child"), worn, made).items():
+    for name, text in folder_files(
+        made_child("child"), Seen("planned" if worn else "none"), made
+    ).items():
         assert text.endswith("\n")
         assert "\n\n\n" not in text, name
         assert [line for line in text.splitlines() if len(line) > WIDTH] == [], name
@@ -211,8 +214,9 @@ def test_the_way_from_made_recordings_to_a_checked_prediction(
 
 def test_printed_solves_name_problems_and_configs_that_are_there() -> None:
     for worn in (True, False):
-        files = folder_files(made_child("child"), worn, False)
-        for step in next_steps(worn, False):
+        seen = Seen("planned" if worn else "none")
+        files = folder_files(made_child("child"), seen, False)
+        for step in next_steps(seen, False):
             for command in step.commands:
                 for word in shlex.split(command):
                     assert not word.endswith(".yaml") or word in files, command
@@ -266,3 +270,60 @@ def test_what_init_prints_fits_a_terminal(here: Path) -> None:
     output = run("init", "my-child").output
     assert [line for line in output.splitlines() if len(line) > WIDTH] == []
     assert re.search(r"^  cd my-child$", output, re.MULTILINE)
+
+
+SEEN = ("--brace", "worn", "--speed", 0.8, "--knee-flexion", "40,30 deg",
+        "--examined", "popliteal_angle=55", "--examined", "hip_extension=-5,0")  # fmt: skip
+
+
+def test_what_was_seen_decides_the_predictions(here: Path) -> None:
+    result = run("init", "child", *SEEN)
+    assert result.exit_code == 0, result.output
+    patient = load_patient(here / "child")
+    assert patient.examination.popliteal_angle == Sides[float](right=55.0, left=55.0)
+    assert patient.examination.hip_extension == Sides[float](right=-5.0, left=0.0)
+    barefoot, worn = (load_config(here / "child" / f"{p}.yaml") for p in problems_of(True))
+    assert barefoot.bounds.least_walking_speed == worn.bounds.least_walking_speed == 0.8
+    assert barefoot.bounds.joint_ranges["knee_r"][0] == pytest.approx(np.deg2rad(40.0), abs=1e-3)
+    assert barefoot.bounds.joint_ranges["knee_l"][0] == pytest.approx(np.deg2rad(30.0), abs=1e-3)
+    straighter = barefoot.bounds.joint_ranges["knee_l"][0] - worn.bounds.joint_ranges["knee_l"][0]
+    assert straighter == pytest.approx(0.2), "with orthoses the knee may become straighter"
+    assert barefoot.model.tissue, "tightness that was examined counts"
+    assert "c3d/orthosis" in (here / "child" / "README.txt").read_text(encoding="utf-8")
+
+
+def test_on_a_terminal_it_asks(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pathwalker_cli.commands.init._at_a_terminal", lambda: True)
+    answers = "none\n0.7\n25\n\n60,50\n\n\n\n"
+    result = CliRunner().invoke(cli, ["init", "child"], input=answers)
+    assert result.exit_code == 0, result.output
+    assert "Examined popliteal angle [deg; right,left]" in result.output
+    patient = load_patient(here / "child")
+    assert patient.orthosis is None
+    assert patient.examination.popliteal_angle == Sides[float](right=60.0, left=50.0)
+    assert load_config(here / "child" / "mapd-barefoot.yaml").bounds.least_walking_speed == 0.7
+    silent = CliRunner().invoke(cli, ["init", "open"], input="\n" * 8)
+    assert silent.exit_code == 0, silent.output
+    assert load_config(here / "open" / "mapd-orthosis.yaml").bounds.joint_ranges == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--speed", 40), "--speed: is 40 m/s; allowed: 0.05 to 2.5 m/s"),
+        (("--knee-flexion", "bent"), "--knee-flexion: is 'bent'; allowed: degrees, or right,left"),
+        (("--knee-flexion", "1,2,3"), "--knee-flexion: is '1,2,3'"),
+        (("--knee-flexion", 170), "allowed: 3 to 85 deg"),
+        (("--examined", "poplitael_angle=50"), "did you mean 'popliteal_angle'?"),
+        (("--examined", "hip_extension"), "--examined hip_extension: is ''"),
+        (("--brace", "worn", "--without-orthosis"), "contradicts --brace worn"),
+    ],
+)
+def test_what_cannot_have_been_seen_is_refused(
+    here: Path, words: tuple[object, ...], told: str
+) -> None:
+    result = run("init", "child", *words)
+    assert result.exit_code == 2
+    assert told in result.output
+    assert result.output.count("\n") == 1
+    assert not (here / "child").exists()

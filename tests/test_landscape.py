@@ -40,7 +40,7 @@ from pathwalker_cli.studies.landscape.text import landscape_lines, write_tables
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
-COARSE = ("dorsiflexion.points=4", "plantarflexion=[5, 20, 80]")
+COARSE = ("side=right", "dorsiflexion=[5, 13.2, 34.8, 92]", "plantarflexion=[5, 20, 80]")
 
 Make = Callable[..., tuple[Landscape, MadeResolver]]
 
@@ -118,6 +118,12 @@ def test_the_grid_joins_the_optimum_to_the_corners_of_its_cell() -> None:
     assert len(graph.outwards) == 10
     outside = grid(k, k, (92.0, 5.0))
     assert outside.neighbours["optimum"] == ("d3-p1",)
+
+
+def test_springs_that_exist_stand_on_the_axes() -> None:
+    found = axis_values(Axis(points=4), (5.0, 92.0), "dorsiflexion", (40.1, 91.7, 200.0))
+    assert found == pytest.approx([5.0, 13.2, 40.1, 91.7], abs=0.01)
+    assert LandscapeStudy(base="").side == "both", "a pair of orthoses is fitted on two legs"
 
 
 @pytest.mark.parametrize("side", ["right", "left", "both"])

@@ -83,7 +83,7 @@ def test_a_new_measure_stands_in_every_table_of_runs(runs: list[Path], tmp_path:
     assert KEY in evaluation["changes"]
     found = CliRunner().invoke(cli, ["compare", *map(str, runs), "--json"])
     assert [*json.loads(found.stdout)["metrics"][KEY]["values"].values()] == values
-    section = gait_section(read_runs(runs), ())
+    section = gait_section(read_runs(runs))
     assert "Froude number" in [row.cells[0] for row in section.tables[0].rows]
     case = cast(
         BatchCase, SimpleNamespace(name="c", patient="p", problem="m", values={}, variant="")

@@ -72,3 +72,24 @@ def test_what_the_file_says_wrongly_still_has_its_line(here: Path) -> None:
     with pytest.raises(ConfigError, match=r"mine.yaml, line 3: mesh.degree: is 9"):
         load_config(path, changes=("mesh.refinements=2",))
     assert load_config(path, changes=("mesh.degree=4",)).mesh.degree == 4
+
+
+@pytest.mark.parametrize(
+    ("change", "where", "place", "value"),
+    [
+        ("variation.scale.strengths.knee_extension.left=0.9", "scale",
+         "strengths.knee_extension.left", 0.9),
+        ("variation.shift.orthosis.neutral_angle=0.01", "shift", "orthosis.neutral_angle", 0.01),
+    ],
+)  # fmt: skip
+def test_dots_go_on_into_names_that_have_dots(
+    change: str, where: str, place: str, value: float
+) -> None:
+    config = load_config("mapd-barefoot", changes=(change, "variation.scale.body_mass=1.1"))
+    assert getattr(config.variation, where)[place] == value
+    assert config.variation.scale["body_mass"] == 1.1
+
+
+def test_a_mapping_instead_of_a_number_is_told_the_form_that_works() -> None:
+    with pytest.raises(ConfigError, match=r"which is not a number.*KEY=\{name.with.dots: 1\}"):
+        load_config("mapd-barefoot", changes=("cost.goals.steady_trunk.left=1",))

@@ -6,6 +6,7 @@ import copy
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -223,3 +224,28 @@ def test_a_number_stands_at_its_key_then_in_numbers_then_is_the_default() -> Non
     assert bare.number("orthosis.damping.left", 0.1) == 0.1
     with pytest.raises(PatientError, match="strengths is not given"):
         patient.model_copy(update={"strengths": None}).number("strengths.hip_flexion.left")
+
+
+def test_angles_may_be_written_in_degrees_where_they_say_so(tmp_path: Path) -> None:
+    content = load_patient("sreenivasa2017-patient").model_dump(mode="json", exclude_none=True)
+    orthosis = content["orthosis"]
+    orthosis["neutral_angle"] = "-2 deg"
+    orthosis["dorsiflexion_stop"] = {"right": "-7.5deg", "left": -0.13}
+    orthosis["stiffness_guess"]["dorsiflexion"] = "1.6 N m/deg"
+    content["examination"] = {"popliteal_angle": "55 deg"}
+    file = tmp_path / "patient.yaml"
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    patient = load_patient(file)
+    assert patient.orthosis is not None
+    assert patient.orthosis.neutral_angle == pytest.approx(np.deg2rad(-2.0))
+    assert patient.orthosis.dorsiflexion_stop.right == pytest.approx(np.deg2rad(-7.5))
+    assert patient.orthosis.stiffness_guess.dorsiflexion == pytest.approx(np.rad2deg(1.6))
+    assert patient.examination.popliteal_angle.left == 55.0  # type: ignore[union-attr]
+    orthosis["neutral_angle"] = "2 degrees"
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    with pytest.raises(PatientError, match="or a number with deg"):
+        load_patient(file)
+    orthosis["neutral_angle"] = "-50 deg"
+    file.write_text(yaml.safe_dump(content), encoding="utf-8")
+    with pytest.raises(PatientError, match=r"is -0.872665 rad"):
+        load_patient(file)

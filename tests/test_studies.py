@@ -78,7 +78,8 @@ def free(*addresses: str) -> str:
          "dorsiflexion_stiffness_left is no number of the problem; allowed: plantarflexion_"),
         ("perturb", ("springs=[K_D]",), "springs[0]: K_D is no number of the problem"),
         ("landscape", (PRESCRIBED,), "dorsiflexion: runs from 40 to 40 N m/rad"),
-        ("landscape", (free(TIED),), "side: is right, but the problem chooses one dorsiflexion"),
+        ("landscape", (free(TIED), "side=right"),
+         "side: is right, but the problem chooses one dorsiflexion"),
         ("uncertainty", ("quantities={orthosis.neutral_angle: {absolute: 0.5}}",), "is refused"),
     ],
 )  # fmt: skip

@@ -12,7 +12,7 @@ import pytest
 from conftest import MadeSolution
 from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.report.folders import STUDIES, Kind, studies_near
-from pathwalker_cli.report.html import page_of
+from pathwalker_cli.report.page import page_of
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.results import run_folder
@@ -76,8 +76,6 @@ def run(tmp_path_factory: pytest.TempPathFactory, made_solution: MadeSolution) -
 def test_any_value_in_a_summary_of_a_study(
     kind: Kind, run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # figures are made, but written nowhere, which takes nearly all of the time
-    monkeypatch.setattr("pathwalker_cli.report.figures.inline_svg", lambda *words: "")
     write_studies(tmp_path, run)
     (shown,) = read_runs([run])
     metrics = shown.run.metrics

@@ -28,9 +28,12 @@ from pathwalker_cli.studies.neighbours import Solved
 from pathwalker_cli.studies.uncertainty import UncertaintyStudy, draw_cases, uncertainty
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input, draw, inputs_of
 from pathwalker_cli.studies.uncertainty.result import (
+    Spread,
     Uncertainty,
     chance_level,
     rank_correlations,
+    span_text,
+    span_words,
     spreads,
     uncertainty_content,
 )
@@ -384,3 +387,20 @@ def test_what_was_learnt_says_which_springs_it_leaves_open(k_d: np.ndarray, word
     (advice,) = uncertainty_content(result)["advice"]
     assert words in advice
     assert "cost." not in advice
+
+
+def spread_of(values: np.ndarray) -> Spread:
+    measure = next(m for m in measures_in("studies") if m.key == STIFFNESSES[0])
+    quantiles = tuple(np.quantile(values, (0.05, 0.5, 0.95)).tolist())
+    return Spread(measure, 50.0, quantiles, 0.0, 1.0, np.zeros(1), None)
+
+
+def test_few_draws_have_no_tails_and_a_limit_is_no_range() -> None:
+    few, many = np.linspace(10.0, 60.0, 6), np.linspace(10.0, 60.0, 101)
+    assert span_words(6) == "range of 6"
+    assert span_text(spread_of(few), few, (5.0, 90.0)) == "10.0 to 60.0"
+    assert span_words(101) == "90 % of draws"
+    assert span_text(spread_of(many), many, (5.0, 90.0)) == "12.5 to 57.5"
+    stuck = np.full(30, 90.0)
+    assert span_text(spread_of(stuck), stuck, (5.0, 90.0)) == "all at upper limit"
+    assert span_text(spread_of(stuck), stuck, (90.0, 90.0)) == "90.0 to 90.0", "prescribed"

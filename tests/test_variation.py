@@ -44,6 +44,14 @@ def test_lengths_left_to_proportions_are_filled_in_and_scaled() -> None:
     )
     longer = varied(bare, Variation(scale={"segment_lengths.thigh": 1.1}))
     assert longer.length("thigh", "left") == pytest.approx(1.1 * bare.length("thigh", "left"))
+    (told,) = (note for note in bare.notes if note.startswith("segment length thigh: "))
+    assert told in longer.notes, "it still comes from proportions"
+    again = varied(longer, Variation(scale={"body_mass": 1.1}))
+    assert told in again.notes
+    assert again.notes[-2:] == (
+        longer.notes[-1],
+        "differs from the patient's file: body_mass x 1.1",
+    )
 
 
 def test_the_model_follows_and_the_notes_say_so() -> None:

@@ -113,6 +113,14 @@ def recorded_name(runs: Sequence[GaitFrames]) -> str:
     return f"recorded, trial {behind.name}, in step{'; dots: markers' if behind.markers else ''}"
 
 
+def _faster(ratio: float) -> str:
+    """Return how a stride is shown that in truth takes so many times as long."""
+    if round(ratio, 2) == 1.0:
+        return "in its own time"
+    word, share = ("faster", ratio) if ratio > 1.0 else ("slower", 1.0 / ratio)
+    return f"{100.0 * (share - 1.0):.0f} % {word} than it walks"
+
+
 def pace(runs: Sequence[GaitFrames]) -> str:
     """Return how the clocks of two strides go together; nothing for one stride."""
     if len(runs) < 2:
@@ -121,5 +129,5 @@ def pace(runs: Sequence[GaitFrames]) -> str:
     ratio = second.duration / first.duration
     return (
         f"Both walkers are shown at the same share of the right gait cycle, at the pace of "
-        f"{first.name}: {second.name} moves {ratio:.2f} times as fast as it walks."
+        f"{first.name}: {second.name} is shown {_faster(ratio)}."
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from math import isnan, nan
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +11,7 @@ import click
 
 if TYPE_CHECKING:
     from pathwalker_cli.starter.child import Child
+    from pathwalker_cli.starter.seen import Brace
 
 
 @click.command("init")
@@ -27,7 +30,24 @@ if TYPE_CHECKING:
     help="Measure the child in a recorded pose or walk; C3D... are its barefoot walks.",
 )
 @click.option("--subject", metavar="NAME", help="Whose markers, if that file names several.")
-@click.option("--without-orthosis", is_flag=True, help="Of a child that only walks barefoot.")
+@click.option(
+    "--brace",
+    type=click.Choice(["none", "planned", "worn"]),
+    help="Whether an orthosis is planned or worn already; planned if left out.",
+)
+@click.option("--without-orthosis", is_flag=True, help="The same as --brace none.")
+@click.option("--speed", type=float, metavar="M/S", help="Walking speed that was seen, barefoot.")
+@click.option(
+    "--knee-flexion",
+    metavar="DEG",
+    help="Least knee flexion in stance that was seen, barefoot: 35, or 40,30 right and left.",
+)
+@click.option(
+    "--examined",
+    multiple=True,
+    metavar="NAME=DEG",
+    help="Range of motion from the couch, e.g. popliteal_angle=50 or hip_extension=-5,0.",
+)
 @click.option("--example", is_flag=True, help="Also make C3D recordings of the child, to try all.")
 def init_command(
     folder: Path,
@@ -39,7 +59,11 @@ def init_command(
     sex: str | None,
     source: Path | None,
     subject: str | None,
+    brace: Brace | None,
     without_orthosis: bool,
+    speed: float | None,
+    knee_flexion: str | None,
+    examined: tuple[str, ...],
     example: bool,
 ) -> None:
     """Write a folder for a new child: patient, orthosis and configs that explain themselves.
@@ -48,6 +72,9 @@ def init_command(
     comment with its unit and where to measure it. With --example, C3D files are made too: gait that
     was recorded of another child, played by the model of the made-up one. DIR must be new or empty.
 
+    On a terminal it asks for what decides a prediction (orthosis, speed, crouch, tightness) unless
+    one of these is given; Enter leaves each open.
+
     With --from, body mass, height, lengths and feet are those of a recording with a marker set that
     is recognised, and the file says where each number comes from; walks are copied to c3d/barefoot.
     """
@@ -55,6 +82,7 @@ def init_command(
     from pathwalker_cli.io.c3d_checks import c3d_files
     from pathwalker_cli.starter.child import made_child
     from pathwalker_cli.starter.files import command_lines, next_steps, write_folder
+    from pathwalker_cli.starter.seen import seen_of
 
     id_ = name or _safe(folder.resolve().name)
     if source:
@@ -69,8 +97,14 @@ def init_command(
     else:
         child = made_child(id_, age, mass, height, **({"sex": sex} if sex else {}))
     walks = c3d_files(walks)
-    with_orthosis = not without_orthosis
-    write_folder(folder, child, with_orthosis, example, walks)
+    brace = "none" if without_orthosis and brace is None else brace
+    given = (brace, speed, knee_flexion, *examined)
+    if not example and not any(given) and _at_a_terminal():
+        brace, speed, knee_flexion, examined = _asked()
+    seen = seen_of(brace or "planned", speed, knee_flexion or "", examined)
+    if without_orthosis and seen.with_orthosis:
+        raise DataError(f"contradicts --brace {brace}", where="--without-orthosis")
+    write_folder(folder, child, seen, example, walks)
     kind = "a child" if source else "a made-up child"
     click.echo(
         f"Wrote {folder}: {kind} of {child.age:g} years, {child.body_mass:g} kg and "
@@ -80,10 +114,34 @@ def init_command(
         click.echo(f"  {origin}")
     click.echo("\nNext:\n" if source else "Next:\n")
     click.echo(f"{command_lines(f'cd {_quoted(folder)}', 2)}")
-    for number, step in enumerate(next_steps(with_orthosis, example, bool(walks)), start=1):
+    for number, step in enumerate(next_steps(seen, example, bool(walks)), start=1):
         click.echo(f"\n{click.wrap_text(f'{number}. {step.why}', 80, '# ', '# ')}")
         for command in step.commands:
             click.echo(command_lines(command, 2))
+
+
+def _at_a_terminal() -> bool:
+    return sys.stdin.isatty()
+
+
+def _asked() -> tuple[Brace, float | None, str, tuple[str, ...]]:
+    """Ask for what decides a prediction; Enter leaves each open."""
+    from pathwalker_cli.starter.seen import BRACES, EXAMINED
+
+    click.echo("What decides the prediction; Enter leaves a question open.")
+    brace = click.prompt("Orthosis", type=click.Choice(BRACES), default="planned")
+    speed = click.prompt("Walking speed seen, barefoot [m/s]", type=float, default=nan,
+                         show_default=False)  # fmt: skip
+    knee = click.prompt("Least knee flexion in stance seen, barefoot [deg; right,left]",
+                        default="", show_default=False)  # fmt: skip
+    examined = {
+        name: click.prompt(f"Examined {name.replace('_', ' ')} [deg; right,left]", default="",
+                           show_default=False)
+        for name in EXAMINED
+    }  # fmt: skip
+    click.echo()
+    told = tuple(f"{name}={angles}" for name, angles in examined.items() if angles.strip())
+    return brace, None if isnan(speed) else speed, knee, told
 
 
 def _measured_child(

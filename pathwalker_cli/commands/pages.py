@@ -18,9 +18,15 @@ if TYPE_CHECKING:
 
 @click.command("report")
 @runs_argument()
-@out_option("The page; an earlier one is replaced.", "-o", required=True, metavar="FILE.html")
-def report_command(runs: tuple[Path, ...], out: Path) -> None:
-    """Write one self-contained HTML page about RUN folders, to be read or printed.
+@out_option("The page; an earlier one is replaced.", "-o", metavar="FILE.html")
+@click.option(
+    "--pdf",
+    type=click.Path(path_type=Path),
+    metavar="FILE.pdf",
+    help="The same page as a PDF file, for A4.",
+)
+def report_command(runs: tuple[Path, ...], out: Path | None, pdf: Path | None) -> None:
+    """Write one self-contained HTML page about RUN folders, a PDF file, or both.
 
     Runs of one patient, barefoot and with orthoses, stand side by side; folders of perturb,
     sensitivity and landscape among RUN, inside or beside a run add their tables. Folders that id
@@ -28,14 +34,28 @@ def report_command(runs: tuple[Path, ...], out: Path) -> None:
     is refused, except in a cohort, where it is shown as failed.
     """
     from pathwalker_cli.errors import DataError
-    from pathwalker_cli.io.atomic import check_output, write_text
-    from pathwalker_cli.report.html import page_html, page_of
+    from pathwalker_cli.io.atomic import atomic_open, check_output, write_text
+    from pathwalker_cli.report.html import page_html
+    from pathwalker_cli.report.page import page_of
 
-    if out.suffix not in (".html", ".htm"):
-        raise DataError("is no name of a page", where=f"--out {out}", allowed="FILE.html")
-    check_output(out)
-    write_text(out, page_html(page_of(runs)))
-    click.echo(f"Written to {out}")
+    if out is None and pdf is None:
+        raise DataError("names no file", where="report", mend="add -o FILE.html or --pdf FILE.pdf")
+    for option, file, endings in (("--out", out, (".html", ".htm")), ("--pdf", pdf, (".pdf",))):
+        if file is not None:
+            if file.suffix not in endings:
+                what, allowed = "is no name of such a page", f"FILE{endings[0]}"
+                raise DataError(what, where=f"{option} {file}", allowed=allowed)
+            check_output(file)
+    page = page_of(runs)
+    if out is not None:
+        write_text(out, page_html(page))
+        click.echo(f"Written to {out}")
+    if pdf is not None:
+        from pathwalker_cli.report.pdf import page_pdf
+
+        with atomic_open(pdf, "wb") as written:
+            written.write(page_pdf(page))
+        click.echo(f"Written to {pdf}")
 
 
 _PAGE, _FILMS = ".html", (".gif", ".mp4")

@@ -108,6 +108,7 @@ def _report(outcome: Outcome, folder: Path) -> None:
         detail_lines,
         notes_together,
         optimum_lines,
+        solution_notes,
         source_lines,
         spring_notes,
         summary_rows,
@@ -117,7 +118,9 @@ def _report(outcome: Outcome, folder: Path) -> None:
     solution, metrics, verdict = outcome
     if solution.config.smoke:
         click.echo("SMOKE: a quick check on a coarse mesh; its numbers are not for use.\n")
-    notes = spring_notes(metrics, stiffness_ranges(solution)) if solution.converged else ()
+    notes = []
+    if solution.converged:
+        notes = spring_notes(metrics, stiffness_ranges(solution)) + solution_notes(solution)
     _echo(summary_rows(metrics, solution.status, solution.cost), notes)
     click.echo()
     if verdict is not None:

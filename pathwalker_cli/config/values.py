@@ -14,6 +14,10 @@ NO_VALUE: Final = "-"
 """Stands for the value of a key that a config does not have, such as one of a mapping."""
 
 
+PLACES: Final = (("variation", "scale"), ("variation", "shift"), ("numbers",), ("free",))
+"""Mappings whose keys are dotted places themselves, e.g. "strengths.knee_extension.left"."""
+
+
 def apply_change(mapping: dict[str, Any], change: str) -> KeyPath:
     """Put one override "a.b=value" into a mapping; the value is read as YAML.
 
@@ -123,6 +127,9 @@ def _holder(mapping: dict[str, Any], key: str, where: str) -> tuple[dict[str, An
         ConfigError: If there is a value on the way that holds no keys.
     """
     *parents, last = key.split(".")
+    for names in PLACES:  # what stands in them by its place has the dots in its name
+        if (*parents[: len(names)],) == names:
+            parents, last = [*names], ".".join([*parents[len(names) :], last])
     for parent in parents:
         mapping = mapping.setdefault(parent, {})
         if not isinstance(mapping, dict):

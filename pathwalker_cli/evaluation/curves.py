@@ -147,7 +147,7 @@ def _toe_off(gait: Stride, side: Side) -> float:
 
 
 def draw_ankle(ax: Axes, shown: Sequence[Trace], side: Side) -> None:
-    """Draw the profiles of one ankle: recorded ones, each gait's own, the line of its mean slope.
+    """Draw the profiles of one ankle: recorded ones, each gait's own, the line of its slope.
 
     Dorsiflexion is positive, and so is the plantarflexing torque of muscles and orthosis.
 
@@ -186,7 +186,7 @@ def _draw_recorded_profiles(ax: Axes, trace: Trace, side: Side) -> None:
 
 
 def _draw_profile(ax: Axes, trace: Trace, side: Side) -> float:
-    """Draw a gait's own profile and the line of its mean slope; return the slope [N m/rad]."""
+    """Draw a gait's own profile and the line of its slope; return the slope [N m/rad]."""
     profile, look = trace.gait.ankle_profile(side, FINE), trace.look(side)
     ax.plot(to_degrees(profile[:, 0]), profile[:, 1], **look)
     ax.plot(to_degrees(profile[0, 0]), profile[0, 1], "o", color=look["color"], markersize=4)

@@ -37,6 +37,7 @@ from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.stride.measure import SECTIONS, Measure
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.stride.stride import Stride
+from pathwalker_cli.stride.unusual import unusual
 
 
 @dataclass(frozen=True)
@@ -106,6 +107,7 @@ class Evaluation:
         rows: All measures in the order of `compared`; those that neither gait nor recordings nor
             article know are left out.
         notes: What could not be compared and what to know, one sentence each.
+        unusual: What no child does, one phrase each.
     """
 
     gait: Stride
@@ -113,6 +115,7 @@ class Evaluation:
     one_trial: str
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
+    unusual: tuple[str, ...] = ()
 
     def row(self, key: str) -> Row:
         """Return the row of a measure.
@@ -120,10 +123,14 @@ class Evaluation:
         Raises:
             KeyError: If it was left out.
         """
-        found = next((row for row in self.rows if row.measure.key == key), None)
+        found = self.find(key)
         if found is None:
             raise KeyError(key)
         return found
+
+    def find(self, key: str) -> Row | None:
+        """Return the row of a measure, None if it was left out."""
+        return next((row for row in self.rows if row.measure.key == key), None)
 
 
 def evaluate_gait(
@@ -166,6 +173,7 @@ def evaluate_gait(
         one_trial=reference.name if reference else "",
         rows=tuple(row for row in rows if any((row.value is not None, row.recorded, row.paper))),
         notes=notes,
+        unusual=unusual(gait) if gait.part is None else (),
     )
 
 

@@ -43,7 +43,7 @@ def cycle_figure(trace: Trace, curves: Sequence[CycleCurve]) -> Figure:
 
 
 def ankle_figure(trace: Trace) -> Figure:
-    """Return the net torque-angle profile of both ankles over stance with its mean slope.
+    """Return the net torque-angle profile of both ankles over stance with its slope over stance.
 
     Raises:
         NotKnownError: If the torques of the gait are not known.
@@ -169,7 +169,7 @@ def _trace_handles(shown: Sequence[Trace]) -> list[Artist]:
 
 def _ankle_handles() -> list[Artist]:
     """Return the entries of what only the ankle's profile shows."""
-    slope = style.entry("its mean slope", color="black", linewidth=0.9, linestyle=":")
+    slope = style.entry("its slope over stance", color="black", linewidth=0.9, linestyle=":")
     return [_dot("foot strike"), slope]
 
 

@@ -16,7 +16,7 @@ from numpy.lib.recfunctions import structured_to_unstructured
 
 from pathwalker_cli.conventions import GRAVITY, SIDES, Side
 from pathwalker_cli.paths import shipped
-from pathwalker_cli.stride.figures.curves import ANGLES, MOMENTS
+from pathwalker_cli.stride.figures.curves import ANGLES, MOMENTS, POWERS
 from pathwalker_cli.stride.measure import TYPICAL, Measure, per_side
 from pathwalker_cli.stride.stride import NotKnownError, Stride
 
@@ -34,7 +34,7 @@ _COMMENTS: Final = 4
 
 QUANTITIES: Final = {
     **{c.key: c.key.removeprefix("angle_") for c in ANGLES if c.key != "angle_lumbar"},
-    **{c.key: f"{c.key.removeprefix('moment_')}_moment" for c in MOMENTS},
+    **{c.key: f"{c.key.partition('_')[2]}_{c.key.partition('_')[0]}" for c in (*MOMENTS, *POWERS)},
 }
 """Column of the table by key of a curve."""
 

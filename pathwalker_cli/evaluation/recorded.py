@@ -31,12 +31,13 @@ Position = Literal["below", "in", "above"]
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean and range over trials, strides or stances, and their number."""
+    """Mean and range over trials, strides or stances, their number and standard deviation."""
 
     mean: float
     low: float
     high: float
     count: int
+    sd: float
 
     def position(self, value: float) -> Position:
         """Return where a value lies in relation to the range."""
@@ -50,7 +51,8 @@ def spread(values: Iterable[float]) -> Spread | None:
     known = np.array(list(values), dtype=float)
     if known.size == 0:
         return None
-    return Spread(float(known.mean()), float(known.min()), float(known.max()), known.size)
+    sd = float(known.std(ddof=1)) if known.size > 1 else 0.0
+    return Spread(float(known.mean()), float(known.min()), float(known.max()), known.size, sd)
 
 
 @dataclass(frozen=True)

@@ -18,17 +18,19 @@ _LITERATURE: Final = 2.0
 
 
 def evaluation_lines(evaluation: Evaluation) -> Iterator[str]:
-    """Yield one line per measure: ours, recorded mean and range, and the article's number."""
+    """Yield one line per measure: of the run, recorded mean and range, the article's number."""
     gait, patient = evaluation.gait, evaluation.gait.walker.patient.id
     compared = evaluation.recorded is not None
     yield f"{gait.name}: {gait.problem}, patient {patient}"
-    yield _line("", "ours", "recorded", "ours", "paper" if patient == PATIENT else "", "unit")
-    yield _line("", "", "mean [min, max]" if compared else "none", "is", "", "")
+    head = ("recorded", "run is") if compared else ("", "")
+    yield _line("", "run", *head, "paper" if patient == PATIENT else "", "unit")
+    if compared:
+        yield _line("", "", "mean [min, max]", "", "", "")
     for section, rows in groupby(evaluation.rows, lambda row: row.measure.section):
         yield section
         for row in rows:
             measure = row.measure
-            recorded = spread_text(row.recorded, measure)
+            recorded = spread_text(row.recorded, measure) if compared else ""
             yield _line(measure.row, measure.text(row.value), recorded, row.position or "",
                         str(row.paper or ""), measure.shown_unit)  # fmt: skip
 
@@ -36,8 +38,9 @@ def evaluation_lines(evaluation: Evaluation) -> Iterator[str]:
 def change_lines(changes: Sequence[Change]) -> Iterator[str]:
     """Yield one line per measure: barefoot, orthosis, the change, also recorded and printed."""
     paper = "paper" if any(change.paper is not None for change in changes) else ""
+    recorded = "recorded" if any(change.recorded is not None for change in changes) else ""
     yield "From barefoot to orthosis"
-    yield _change_line("", "barefoot", "orthosis", "change", "[%]", "recorded", paper, "unit")
+    yield _change_line("", "barefoot", "orthosis", "change", "[%]", recorded, paper, "unit")
     for section, rows in groupby(changes, lambda change: change.measure.section):
         yield section
         for row in rows:
@@ -45,13 +48,16 @@ def change_lines(changes: Sequence[Change]) -> Iterator[str]:
             yield _change_line(
                 measure.row, measure.text(row.barefoot), measure.text(row.orthosis),
                 measure.text(row.value, sign=True), row.percent,
-                measure.text(row.recorded, sign=True), str(row.paper or ""), measure.shown_unit,
+                measure.text(row.recorded, sign=True) if recorded else "",
+                str(row.paper or ""), measure.shown_unit,
             )  # fmt: skip
 
 
 def evaluation_notes(evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
     """Return what the reader of the tables should know, one sentence each."""
-    notes = [f"{each.gait.name}: {note}" for each in evaluations for note in each.notes]
+    notes = [
+        f"{each.gait.name}: {note}" for each in evaluations for note in (*each.notes, *each.unusual)
+    ]
     notes += [note for each in evaluations for note in _peak_note(each)]
     if any(each.recorded is not None for each in evaluations):
         notes.append(
@@ -83,7 +89,7 @@ def _peak_note(evaluation: Evaluation) -> Iterable[str]:
 
 def _line(label: str, ours: str, recorded: str, is_: str, paper: str, unit: str) -> str:
     """Return a line of the table of an evaluation."""
-    return f" {label:<22}{ours:>6}  {recorded:>20}  {is_:<5} {paper:>11}  {unit}".rstrip()
+    return f" {label:<22}{ours:>6}  {recorded:>20}  {is_:<6}{paper:>11}  {unit}".rstrip()
 
 
 def _change_line(
@@ -130,6 +136,7 @@ def _run(evaluation: Evaluation) -> dict[str, Any]:
         "recordings": [trial.name for trial in recorded.trials] if recorded else [],
         "one_trial": evaluation.one_trial,
         "notes": list(evaluation.notes),
+        "unusual": list(evaluation.unusual),
         "quantities": {row.measure.key: _row(row) for row in evaluation.rows},
     }
 

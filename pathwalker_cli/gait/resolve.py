@@ -161,6 +161,11 @@ class Resolver:
         """Return a solver of the neighbours of an optimum."""
         return cls(optimum.case, optimum.motion, optimum.result.multipliers, tolerance)
 
+    @property
+    def begins_there(self) -> bool:
+        """Whether multipliers of this problem are known, so that its solve begins at the end."""
+        return self._multipliers is not None
+
     @cached_property
     def optimum(self) -> Optimum:
         """The optimum itself, solved to the tolerance."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 import sys
 from dataclasses import dataclass
 from types import NoneType, UnionType
@@ -13,6 +15,14 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 T = TypeVar("T")
+
+_WRITTEN: Final = re.compile(r"([-+]?\d+(?:\.\d*)?) *(deg|N m/deg)")
+_PER_DEGREE: Final = {
+    ("rad", "deg"): math.pi / 180.0,
+    ("deg", "deg"): 1.0,
+    ("N m/rad", "N m/deg"): 180.0 / math.pi,
+}
+"""Factors from a written unit to that of a quantity."""
 
 _LARGEST: Final = sys.float_info.max
 
@@ -65,10 +75,20 @@ class Quantity:
         return f"{self.lower:g} to {self.upper:g} {self.unit}".rstrip()
 
     def check(self, value: Any) -> float:
-        """Return the value as a float, or raise an error that names unit and range."""
+        """Return the value as a float, or raise an error that names unit and range.
+
+        What is per radian here may be written per degree, with that unit: "7.5 deg".
+        """
+        if isinstance(value, str) and (written := _WRITTEN.fullmatch(value.strip())):
+            factor = _PER_DEGREE.get((self.unit, written[2]))
+            value = value if factor is None else factor * float(written[1])
         if isinstance(value, bool) or not isinstance(value, int | float):
             unit = f" in {self.unit}" if self.unit else ""
             mend = f"write the number alone, the unit is always {self.unit}" if self.unit else ""
+            other = next((w for unit, w in _PER_DEGREE if unit == self.unit != w), "")
+            mend += f", or a number with {other}" if other else ""
+            if isinstance(value, dict):
+                mend = "to go on with dots within a name, give the mapping: KEY={name.with.dots: 1}"
             shown = "empty" if value is None else repr(value)
             what = f"is {shown}, which is not a number{unit}"
             raise invalid(what, allowed=self.allowed, mend=mend)

@@ -246,9 +246,9 @@ class Patient(YamlModel):
             for side in SIDES
         ) / len(SIDES)
 
-    @cached_property
-    def notes(self) -> tuple[str, ...]:
-        """One sentence for everything that was filled in or overridden."""
+    @property
+    def filled_in(self) -> tuple[str, ...]:
+        """One sentence for everything that body proportions stand in for."""
         notes = [
             f"segment length {name}: {default_length(name, self.height):g} m, from body "
             f"proportions ({SOURCE})"
@@ -257,6 +257,12 @@ class Patient(YamlModel):
         ]
         if self.contact_points.barefoot is None:
             notes.append("contact points barefoot: from foot length and height by proportion")
+        return tuple(notes)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """One sentence for everything that was filled in or overridden."""
+        notes = [*self.filled_in]
         if self.sex == "female":
             notes.append(
                 "segment masses: Jensen's regressions are for boys; none for girls is used"

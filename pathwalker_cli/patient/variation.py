@@ -84,7 +84,8 @@ def varied(
     notes += [f"{place} x {factor:g}" for place, factor in variation.scale.items()]
     notes += [f"{place} {amount:+g}" for place, amount in variation.shift.items()]
     changed._origin = patient._origin
-    changed._changes = (f"differs from the patient's file: {', '.join(notes)}",)
+    differs = f"differs from the patient's file: {', '.join(notes)}"
+    changed._changes = (*patient.filled_in, *patient._changes, differs)
     return changed
 
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 from pathwalker_cli.config import StudyConfig
+from pathwalker_cli.config.learnt import config_values
 from pathwalker_cli.config.values import changed_values, value_text
 from pathwalker_cli.conventions import LEG_JOINTS, SUFFIX
+from pathwalker_cli.model.contact import Feet
+from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.report.content import Section, fact_table
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.results.metrics import RunMetrics
@@ -18,9 +23,17 @@ _METHODS: Final = {
     "collocation": "direct collocation",
     "multiple-shooting": "direct multiple shooting",
 }
+_FEET: Final[dict[Feet, str]] = {
+    "points": "a heel and a toe point", "rockers": "circles at heel and toe that roll",
+    "sole": "one convex sole that rolls",
+}  # fmt: skip
 _JOINT: Final = re.compile(rf"\b({'|'.join(LEG_JOINTS)})_([rl])\b")
 _TWO_FEET: Final = re.compile(r"\b(right|left)_(toe|flat)_(right|left)_(heel|flat)\b")
 _SIDE: Final = {suffix: side for side, suffix in SUFFIX.items()}
+_MANY: Final = 5
+"""Values of one part of a config up to which each is told; config.resolved.yaml tells all."""
+_PLACES: Final = 2
+"""Phases up to which each is told; metrics.json tells all."""
 _HASH: Final = 12
 """Digits of a hash that tell files apart."""
 
@@ -42,19 +55,19 @@ def _aim(config: StudyConfig) -> str:
     effort = "squared activation" if power == 2 else f"activation to the power {power}"
     aims = [f"least {effort} per distance"]
     if cost.walking_speed_weight:
-        aims.append(f"speed (weight {cost.walking_speed_weight:g})")
-    aims += [f"{n.replace('_', ' ')} (weight {cost.goals[n]:g})" for n in cost.wanted.names]
+        aims.append(f"speed (weight {cost.walking_speed_weight:.3g})")
+    aims += [f"{n.replace('_', ' ')} (weight {cost.goals[n]:.3g})" for n in cost.wanted.names]
     return ", ".join(aims)
 
 
 def _facts(run: ReportRun) -> dict[str, str]:
     """Return a sentence by label."""
     result, config = run.run.result, run.run.config
-    walker, mesh, solver = run.evaluation.gait.walker, config.mesh, config.solver
+    mesh, solver = config.mesh, config.solver
     quirks = ", with the quirks of the published model" if result.published_model else ""
     return {
-        "Model": f"flat rigid-body walker of {walker.total_mass:.1f} kg in all with 14 muscle "
-        "torque generators, two contact points per foot; dynamics back end "
+        "Model": "flat rigid-body walker with 14 muscle torque generators; feet: "
+        f"{_FEET[config.model.feet]}; dynamics back end "
         f"{_text(result.dynamics_backend)}{quirks}; assumed aim: {_aim(config)}",
         "Mass, strengths": ". ".join([
             f"body mass {run.patient.body_mass:g} kg and strengths from the patient's file",
@@ -63,7 +76,7 @@ def _facts(run: ReportRun) -> dict[str, str]:
         "Active bounds": "; ".join(_bounds(result)) or "none that shapes the gait",
         "Tolerances": f"optimality {solver.tolerance:g}, constraints "
         f"{solver.constraint_tolerance:g}; reached: largest violation "
-        f"{_short(result.largest_violation)} ({_in_words(_text(result.largest_violation_name))})",
+        f"{_short(result.largest_violation)} ({in_words(_text(result.largest_violation_name))})",
         "Re-integration": "an independent integrator misses the next node by at most "
         f"{_short(result.reintegration_position_error)} rad or m and "
         f"{_short(result.reintegration_velocity_error)} rad/s or m/s (asked for: "
@@ -75,16 +88,32 @@ def _facts(run: ReportRun) -> dict[str, str]:
         f"start: {_text(result.start)}; cost {_short(result.cost, '.5g')}",
         "Versions": ", ".join(f"{name} {number}" for name, number in result.versions.items()),
         "Inputs": ", ".join(f"{n} {str(h)[:_HASH]}" for n, h in result.input_hashes.items()),
-        "Config": "; ".join(
-            f"{key} = {value_text(now)}" for key, (now, _) in changed_values(config).items()
-        ) or "all defaults",
+        "Config": "; ".join(_changes(config)) or "all defaults",
     }  # fmt: skip
+
+
+def _changes(config: StudyConfig) -> Iterator[str]:
+    """Yield the values that are no defaults; many of one kind, and learnt ones, only by number."""
+    changed = {key: now for key, (now, _) in changed_values(config).items()}
+    if config.learnt is not None:
+        learnt = config_values(config.learnt.values)
+        learnt |= {f"numbers.{place}": value for place, value in learnt.pop("numbers").items()}
+        own = {k: v for k, v in changed.items() if not k.startswith("learnt.") and k not in learnt}
+        yield f"{len(config.learnt.numbers)} learnt numbers"
+        changed = own
+    kinds = Counter(key.rpartition(".")[0] for key in changed)
+    for kind, count in kinds.items():
+        if count > _MANY:
+            yield f"{count} values of {kind}"
+    for key, now in changed.items():
+        if kinds[key.rpartition(".")[0]] <= _MANY:
+            yield f"{key} = {value_text(now)}"
 
 
 def _bounds(result: RunMetrics) -> Iterator[str]:
     """Yield the active bounds that are choices, where they come from, and how many others."""
     chosen = [bound for bound in result.bounds if interesting(bound)]
-    yield from (_in_words(bound_line(bound)) for bound in chosen)
+    yield from (in_words(bound_line(_short_places(bound))) for bound in chosen)
     given = result.bound_sources or {}
     sources = {b.name: given[b.name] for b in chosen if b.name in given}
     yield from source_lines(sources)
@@ -93,7 +122,13 @@ def _bounds(result: RunMetrics) -> Iterator[str]:
         yield f"{others} more of muscles, ground forces and foot heights at their natural limits"
 
 
-def _in_words(text: str) -> str:
+def _short_places(bound: ActiveBound) -> ActiveBound:
+    """Return a bound that names the phases in which it acts if they are few."""
+    count = len(bound.places)
+    return replace(bound, places=(f"{count} phases",)) if count > _PLACES else bound
+
+
+def in_words(text: str) -> str:
     """Return a text that says "right knee" for "knee_r" and names feet and joints without "_"."""
     text = _JOINT.sub(lambda found: f"{_SIDE[found[2]]} {found[1]}", text)
     return _TWO_FEET.sub(r"\1 \2 with \3 \4", text).replace("_", " ")

@@ -37,7 +37,7 @@ def cohort_page(folders: Sequence[Path]) -> Page:
         Fact("Patients", str(len(patients))),
         *(Fact(label, str(count)) for label, count in counts.items()),
     )
-    answer = f"{counts['Converged']} of {len(rows)} cases of {len(patients)} patients converged."
+    answer = (f"{counts['Converged']} of {len(rows)} cases of {len(patients)} patients converged.",)
     sections = tuple(_section(folder, own) for folder, own in tables.items())
     return Page("Cohort", facts, answer, tuple(_warnings(counts, tables)), sections)
 

@@ -1,17 +1,21 @@
-"""What stands on a page, as plain values: every number is text before a template sees it."""
+"""What stands on a page, as plain values: every number is text before it is set.
+
+The page in HTML and the one in PDF are set from the same values.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Final, Literal
 
 NOT_A_DEVICE = (
     "PathWalker is research software. It is not a medical device, and nothing on this page is a "
     "basis for the treatment of a patient."
 )
 
-Mark = Literal["", "heading", "failed", "good"]
-Shape = Literal["pair", "tall"]
+Mark = Literal["", "heading", "shared", "failed", "good"]
+Shape = Literal["pair", "tall", "panel", "page"]
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,8 @@ class Row:
     """A row of a table.
 
     Args:
-        cells: One text per column; a heading has one for all of them.
+        cells: One text per column; a heading has one for all of them, a shared row one for all but
+            the first.
         mark: What the reader shall see at once: a heading, a failure, or what to look at.
     """
 
@@ -60,34 +65,51 @@ class Table:
         """Let all columns but the first hold numbers unless they are named; check the widths."""
         if not self.columns:
             object.__setattr__(self, "columns", "w" + "n" * (len(self.head) - 1))
-        widths = {len(row.cells) for row in self.rows if row.mark != "heading"}
+        spanning = ("heading", "shared")
+        widths = {len(row.cells) for row in self.rows if row.mark not in spanning}
         if len(self.columns) != len(self.head) or not widths <= {len(self.head)}:
             raise ValueError(f"a table of {len(self.head)} columns has rows of {widths}")
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure as an SVG element that this package drew.
+    """A figure.
 
     Args:
-        svg: The element.
-        shape: "pair" for a row of two panels, "tall" for what is at least twice as high.
+        figure: The Matplotlib figure, made under `stride.figures.style.STYLE`.
+        name: A name that no other figure of the page has; letters, digits and "-".
+        title: What it shows, in words.
+        shape: "pair" for a row of two panels, "tall" for what is at least twice as high, "panel"
+            for one of four that stand side by side, "page" for one across the page.
     """
 
-    svg: str
+    figure: Any
+    name: str
+    title: str
     shape: Shape = "pair"
 
 
 @dataclass(frozen=True)
 class Section:
-    """A part of a page; what it does not have is left out."""
+    """A part of a page; what it does not have is left out.
+
+    Args:
+        title: Its heading.
+        lines: Sentences.
+        facts: Labels and what they say.
+        tables: Its tables.
+        points: A list of sentences.
+        drawings: Its figures.
+        new_page: Whether it begins a new page in print.
+    """
 
     title: str
     lines: tuple[str, ...] = ()
     facts: tuple[Fact, ...] = ()
     tables: tuple[Table, ...] = ()
-    legend: Drawing | None = None
+    points: tuple[str, ...] = ()
     drawings: tuple[Drawing, ...] = ()
+    new_page: bool = False
 
 
 @dataclass(frozen=True)
@@ -97,24 +119,34 @@ class Page:
     Args:
         title: Its title.
         facts: What its head says: who, when, what.
-        answer: The answer in one sentence.
+        answer: The answer in plain sentences.
         warnings: What must be known before the answer is used.
         sections: Its parts in order.
     """
 
     title: str
     facts: tuple[Fact, ...]
-    answer: str
+    answer: tuple[str, ...]
     warnings: tuple[str, ...]
     sections: tuple[Section, ...]
     notice: str = NOT_A_DEVICE
 
 
+_UNIT: Final = re.compile(r"(?<=\d) (?=%|N m|m/s|s/m|deg\b|kg\b)|(?<=\bN) (?=m\b)")
+"""Spaces before and within units."""
+
+
+def tight(text: str) -> str:
+    """Return a text whose units do not part from their numbers at the end of a line."""
+    return _UNIT.sub("\N{NO-BREAK SPACE}", text)
+
+
 def fact_table(rows: tuple[tuple[str, ...], ...], head: tuple[str, ...]) -> Table:
-    """Return a table of sentences, a column per run.
+    """Return a table of sentences, a column per run; what all runs share is said once.
 
     Args:
         rows: Label, then a text per run.
         head: Headings of the columns, the first of the labels.
     """
-    return Table(head, tuple(map(Row, rows)), columns="w" + "p" * (len(head) - 1), even=True)
+    shared = (Row(row[:2], "shared") if len(set(row[1:])) == 1 else Row(row) for row in rows)
+    return Table(head, tuple(shared), columns="w" + "p" * (len(head) - 1), even=True)

@@ -1,44 +1,64 @@
-"""The figures of a page: a column wide each, right beside left, runs over one another."""
+"""The figures of a page."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from pathwalker_cli.evaluation.curves import Trace, known_curves, traces
-from pathwalker_cli.evaluation.figures import ankle_pair, cycle_pairs, legend_handles
+from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.evaluation.curves import Trace, traces
+from pathwalker_cli.evaluation.laboratory import ROWS, ankle_panel, cycle_panel, legend_panel
 from pathwalker_cli.inverse.figures import joint_torque_figure, name_figure
 from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
-from pathwalker_cli.stride.figures.curves import ACTIVATIONS, ANGLES, FORCES, MOMENTS, CycleCurve
-from pathwalker_cli.stride.figures.inline import inline_svg
-from pathwalker_cli.stride.figures.style import STYLE, legend, new_figure
+from pathwalker_cli.stride.figures.stick_figures import walks_figure
+from pathwalker_cli.stride.figures.style import STYLE
+
+
+def walk_section(runs: Sequence[ReportRun]) -> Section:
+    """Return stick figures of every run over the gait cycle."""
+    shown = _traces(runs)
+    names = " and ".join(run.label for run in runs)
+    title = f"Stick figures of the predicted walk over the right gait cycle: {names}"
+    walks = [(trace.label, trace.gait) for trace in shown]
+    drawing = drawn(partial(walks_figure, walks), "walk", title, "page")
+    return Section("How the child would walk", drawings=(drawing,))
 
 
 def curve_section(runs: Sequence[ReportRun]) -> Section:
-    """Return angles, ground forces, moments, ankle torque over angle and activations."""
+    """Return a column of curves per joint, both sides and all runs over one another."""
     shown = _traces(runs)
     names = " and ".join(trace.label for trace in shown)
     drawings = [
-        *(_cycle(curve, shown, names) for curve in (*ANGLES, *FORCES, *MOMENTS)),
         drawn(
-            lambda: ankle_pair(shown),
-            "ankle-torque",
-            f"Net ankle torque [N m] over dorsiflexion [deg] in stance, right and left: {names}",
-            "tall",
-        ),
-        *(_cycle(curve, shown, names) for curve in known_curves(ACTIVATIONS, shown)),
+            partial(cycle_panel, curve, shown),
+            curve.key.replace("_", "-"),
+            f"{curve.name}, {curve.label} over the gait cycle, right and left: {names}",
+            "panel",
+        )
+        for row in ROWS
+        for curve in row
     ]
-    return Section(
-        "Curves over the gait cycle",
-        ("Each side from its own foot strike to its next one. Dots: least knee flexion of stance; "
-         "foot strike at the ankle, where numbers are the slopes of the dotted lines.",),
-        legend=_legend(shown),
-        drawings=tuple(drawings),
-    )  # fmt: skip
+    drawings += [
+        drawn(
+            partial(ankle_panel, shown, side),
+            f"ankle-torque-{side}",
+            f"Net {side} ankle torque [N m] over dorsiflexion [deg] in stance: {names}",
+            "panel",
+        )
+        for side in SIDES
+    ]
+    drawings.append(drawn(partial(legend_panel, shown), "legend", "Legend of the curves", "panel"))
+    line = (
+        "Each side from its own foot strike (0 %) to its next one. Joint moments are internal, "
+        "those of muscles, tissue and orthosis; they jump where the rigid foot of the model "
+        "changes its support. Slopes: torque over angle in stance, in the order of the legend."
+    )
+    return Section("Curves over the gait cycle", (line,), drawings=tuple(drawings), new_page=True)
 
 
 def torque_drawing(trials: Sequence[Trial], body_mass: float, name: str, title: str) -> Drawing:
@@ -54,41 +74,12 @@ def torque_drawing(trials: Sequence[Trial], body_mass: float, name: str, title: 
 
 def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
     """Return the gaits of the runs over their recordings."""
-    gaits_recorded = [(run.evaluation.gait, run.evaluation.recorded) for run in runs]
-    if len(gaits_recorded) == 1:
-        gait, behind = gaits_recorded[0]
-        return (Trace(gait, gait.problem, behind),)
-    gaits, recorded = zip(*gaits_recorded, strict=True)
-    return traces(gaits, [run.label for run in runs], recorded)
-
-
-def _cycle(curve: CycleCurve, shown: Sequence[Trace], names: str) -> Drawing:
-    """Return a quantity of both sides over the gait cycle."""
-    title = f"{curve.name}, {curve.label} over the gait cycle, right and left: {names}"
-    return drawn(lambda: cycle_pairs([curve], shown), curve.key.replace("_", "-"), title)
-
-
-def _legend(shown: Sequence[Trace]) -> Drawing:
-    """Return the legend of all figures over the gait cycle."""
-    handles = legend_handles(shown)
-
-    def draw() -> Figure:
-        figure = new_figure(0.17 * ((len(handles) + 1) // 2) + 0.06)
-        legend(figure, handles)
-        return figure
-
-    return drawn(draw, "legend", "Legend of the curves")
+    gaits = [run.evaluation.gait for run in runs]
+    return traces(gaits, [run.label for run in runs], [run.evaluation.recorded for run in runs])
 
 
 def drawn(draw: Callable[[], Figure], name: str, title: str, shape: Shape = "pair") -> Drawing:
-    """Return a figure as it stands on the page.
-
-    Args:
-        draw: Makes the figure.
-        name: A name that no other figure of the page has; letters, digits and "-".
-        title: What it shows, in words.
-        shape: "tall" if it is at least twice as high as a row of panels.
-    """
+    """Return a figure as it stands on the page; see `Drawing`."""
     with mpl.rc_context(STYLE):
         figure = draw()
-    return Drawing(inline_svg(figure, name, title[:1].upper() + title[1:]), shape)
+    return Drawing(figure, name, title[:1].upper() + title[1:], shape)

@@ -1,41 +1,47 @@
-"""The page about one patient: recommended springs, gait, curves, studies, assumptions."""
+"""The page about one patient: the answer, springs, changes, curves, studies, assumptions."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
-from pathwalker_cli.evaluation.evaluate import Change, changes_between
-from pathwalker_cli.evaluation.tables import spread_text
+from pathwalker_cli.report.answer import answer, hinge_section
 from pathwalker_cli.report.assumptions import assumption_section
+from pathwalker_cli.report.changes import JUDGED, change_section, outcomes
 from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
-from pathwalker_cli.report.figures import curve_section
+from pathwalker_cli.report.figures import curve_section, walk_section
 from pathwalker_cli.report.folders import Study
 from pathwalker_cli.report.runs import ReportRun
-from pathwalker_cli.report.springs import prescribed, recommended, spring_section
+from pathwalker_cli.report.springs import spring_section
 from pathwalker_cli.report.study_tables import study_section
-from pathwalker_cli.stride.measure import KNEE, Measure
-from pathwalker_cli.stride.measures import measure_of, measures_in
+from pathwalker_cli.stride.measure import Measure
+from pathwalker_cli.stride.measures import expanded, measures_in
 from pathwalker_cli.studies.verdict import snapped_warning
 
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
     """Return the page about runs of one patient, barefoot ones first, with studies around them."""
-    patient, changes = runs[0].patient, changes_between([r.evaluation for r in runs])
-    with_orthoses = [run for run in runs if run.worn]
-    sections = [spring_section(run) for run in with_orthoses]
-    sections += [gait_section(runs, changes), curve_section(runs)]
+    patient, found = runs[0].patient, outcomes(runs)
+    sections = [spring_section(run) for run in runs if run.worn]
+    sections += [change_section(runs, found), walk_section(runs), hinge_section(runs, studies)]
+    sections += [curve_section(runs), gait_section(runs)]
     sections += [study_section(study, _base(study, runs)) for study in studies]
     sections.append(assumption_section(runs))
     facts = (
-        Fact("Patient", patient.id),
         Fact("Age", f"{patient.age:g} years"),
-        Fact("Mass", f"{patient.body_mass:g} kg"),
+        Fact("Mass", _mass(runs)),
         Fact("Height", f"{patient.height:g} m"),
         *_of_runs(runs),
     )
-    answer = " ".join(_answer(run, changes) for run in with_orthoses or runs)
-    return Page(f"Gait of {patient.id}", facts, answer, tuple(_warnings(runs)), tuple(sections))
+    named = ", ".join({"orthosis": "with orthoses"}.get(run.label, run.label) for run in runs)
+    title = f"Gait of {patient.id}: {named}"
+    return Page(title, facts, answer(runs, found), tuple(_warnings(runs)), tuple(sections))
+
+
+def _mass(runs: Sequence[ReportRun]) -> str:
+    """Return the body mass, and what it is with orthoses."""
+    worn = dict.fromkeys(f"{r.evaluation.gait.walker.total_mass:.1f} kg" for r in runs if r.worn)
+    more = f" ({', '.join(worn)} with orthoses)" if worn else ""
+    return f"{runs[0].patient.body_mass:g} kg{more}"
 
 
 def _base(study: Study, runs: Sequence[ReportRun]) -> ReportRun:
@@ -52,44 +58,6 @@ def _of_runs(runs: Sequence[ReportRun]) -> list[Fact]:
     else:
         date = ", ".join(f"{run.date} ({run.label})" for run in runs)
     return [Fact("Problems" if len(runs) > 1 else "Problem", problems), Fact("Date", date)]
-
-
-def _answer(run: ReportRun, changes: Sequence[Change]) -> str:
-    """Return what a run says in one sentence."""
-    row = run.evaluation.row
-    speed = row("walking_speed").measure.text(row("walking_speed").value)
-    knees = " and ".join(
-        f"{to_degrees(row(f'min_stance_knee_flexion_{side}').value or 0.0):.1f} deg {side}"
-        for side in SIDES
-    )
-    gait = f"at {speed} m/s with a least stance knee flexion of {knees}"
-    if not run.worn:
-        return f"Predicted {run.label} gait walks {gait}."
-    effort = next((c for c in changes if c.measure.key == "effort_per_distance"), None)
-    saved = ""
-    if effort is not None:
-        values = [effort.measure.text(v) for v in (effort.barefoot, effort.orthosis)]
-        saved = f", with {values[1]} s/m of effort instead of {values[0]} barefoot"
-        saved += f" ({effort.percent} %)"
-    real = run.verdict is not None and run.verdict.snapped is not None
-    kind = "Springs to take" if real else "Springs found"
-    if all(prescribed(run, name) for name in STIFFNESSES):
-        kind = "Springs worn"
-    return f"{kind}: {_springs(run)}; predicted gait walks {gait}{saved}."
-
-
-def _springs(run: ReportRun) -> str:
-    """Return the springs with how sure they are, sides that agree together."""
-    stiffness, verdict = recommended(run), run.verdict
-    sure = {name: "prescribed" for name in STIFFNESSES if prescribed(run, name)}
-    sure |= {s.name: s.determined for s in verdict.springs} if verdict else {}
-    parts: dict[str, list[str]] = {}
-    for name, value in stiffness.items():
-        kind, _, side = measure_of(name).label.rpartition(" ")
-        words = f"{kind} {value:.1f} N m/rad"
-        words += f" ({sure[name]})" if name in sure else ""
-        parts.setdefault(words, []).append(side)
-    return ", ".join(f"{words} {' and '.join(sides)}" for words, sides in parts.items())
 
 
 def _warnings(runs: Sequence[ReportRun]) -> list[str]:
@@ -123,45 +91,41 @@ def _coarse(run: ReportRun) -> bool:
     return any(value is not None and value > asked[kind] for kind, value in reached.items())
 
 
-def gait_section(runs: Sequence[ReportRun], changes: Sequence[Change]) -> Section:
-    """Return the table of steps, times, crouch, forces and effort."""
+def gait_section(runs: Sequence[ReportRun]) -> Section:
+    """Return the table of times, shares and forces, both sides in one row."""
     head, columns = ["", "unit"], "ww"
     for run in runs:
-        head += [run.label, *(["recorded, mean [min, max]", "is"] if _compared(run) else [])]
-        columns += "nnw" if _compared(run) else "n"
-    if changes:
-        head += ["change", "[%]", "recorded change"]
-        columns += "nnn"
-    rows = [_row(measure, runs, changes) for measure in measures_in("report")]
-    notes = ["BW: body weight with what is worn; is: below, in or above the recorded range"]
-    notes += [note for run in runs for note in run.evaluation.notes]
-    found = tuple(row for row in rows if row is not None)
+        recorded = run.evaluation.recorded is not None
+        head += [run.label, *(["recorded range", "is"] if recorded else [])]
+        columns += "nnw" if recorded else "n"
+    judged = {key for family in JUDGED for key in expanded(family)}
+    families: dict[str, list[Measure]] = {}
+    for measure in measures_in("report"):
+        if measure.key not in judged:
+            families.setdefault(measure.family, []).append(measure)
+    found = tuple(filter(None, (_row(sides, runs) for sides in families.values())))
+    notes = ["BW: body weight with what is worn; is: below, in or above the recorded range; two "
+             "values: right, left"]  # fmt: skip
+    notes += [f"{run.label}: {note}" for run in runs for note in run.evaluation.notes]
     table = Table(tuple(head), found, notes=tuple(dict.fromkeys(notes)), columns=columns)
-    return Section("Gait", tables=(table,))
+    return Section("Times and forces", tables=(table,))
 
 
-def _compared(run: ReportRun) -> bool:
-    return run.evaluation.recorded is not None
-
-
-def _row(measure: Measure, runs: Sequence[ReportRun], changes: Sequence[Change]) -> Row | None:
+def _row(sides: Sequence[Measure], runs: Sequence[ReportRun]) -> Row | None:
     """Return the row of a measure, None if no run tells it."""
-    found = [
-        next((row for row in run.evaluation.rows if row.measure.key == measure.key), None)
-        for run in runs
-    ]
-    if not any(found):
-        return None
-    label = measure.label.replace("flexion", "flexion (crouch)", measure.section == KNEE)
-    cells = [label, measure.shown_unit]
-    for run, row in zip(runs, found, strict=True):
-        cells.append(measure.text(row.value if row else None))
-        if _compared(run):
-            cells.append(spread_text(row.recorded if row else None, measure))
-            cells.append((row.position or "") if row else "")
-    if changes:
-        change = next((c for c in changes if c.measure.key == measure.key), None)
-        value, recorded = (change.value, change.recorded) if change else (None, None)
-        cells += [measure.text(value, sign=True), (change and change.percent) or "-"]
-        cells.append(measure.text(recorded, sign=True))
-    return Row(tuple(cells))
+    first, cells, told = sides[0], [], False
+    for run in runs:
+        rows = [run.evaluation.find(measure.key) for measure in sides]
+        known = [row for row in rows if row is not None]
+        told = told or bool(known)
+        cells.append(", ".join(first.text(row.value) for row in known) or "-")
+        if run.evaluation.recorded is not None:
+            spans = [
+                f"{first.text(row.recorded.low)} to {first.text(row.recorded.high)}"
+                for row in known
+                if row.recorded is not None
+            ]
+            cells.append(", ".join(spans) or "-")
+            cells.append(", ".join(row.position for row in known if row.position) or "-")
+    label = first.label.removesuffix(f", {first.side}")
+    return Row((label, first.shown_unit, *cells)) if told else None

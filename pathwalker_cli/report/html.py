@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
-from typing import Final
 
 from jinja2 import Environment
 from markupsafe import Markup
 
 from pathwalker_cli import __version__
 from pathwalker_cli.io.templates import templates
-from pathwalker_cli.report.cohort_page import cohort_page
-from pathwalker_cli.report.content import Drawing, Page
-from pathwalker_cli.report.folders import STUDIES, sorted_folders, studies_near
-from pathwalker_cli.report.gait_page import gait_page
-from pathwalker_cli.report.recorded_page import recorded_page
-from pathwalker_cli.report.runs import read_runs
-
-_UNIT: Final = re.compile(r"(?<=\d) (?=%|N m|m/s|s/m|deg\b|kg\b)|(?<=\bN) (?=m\b)")
-"""Spaces before and within units."""
+from pathwalker_cli.report.content import Drawing, Page, tight
+from pathwalker_cli.stride.figures.inline import inline_svg
 
 
 def page_html(page: Page) -> str:
@@ -35,32 +24,11 @@ def page_html(page: Page) -> str:
 def _environment() -> Environment:
     """Return the templates of this package, which escape everything."""
     environment = templates("pathwalker_cli.report")
-    environment.filters |= {"svg": _svg, "tight": _tight}
+    environment.filters |= {"svg": _svg, "tight": tight}
     return environment
 
 
-def _tight(text: str) -> str:
-    """Return a text whose units do not part from their numbers at the end of a line."""
-    return _UNIT.sub("\N{NO-BREAK SPACE}", text)
-
-
 def _svg(drawing: Drawing) -> Markup:
-    """Return a figure without escaping: `inline_svg` wrote it, and escaped its texts."""
-    return Markup(drawing.svg)  # noqa: S704 - of `inline_svg`, which escapes
-
-
-def page_of(folders: Sequence[Path]) -> Page:
-    """Return the page about runs with their studies, about recorded gait, or about a cohort.
-
-    Raises:
-        DataError: If a folder cannot be used, or they do not go together.
-    """
-    by_kind = sorted_folders(folders)
-    if "recorded" in by_kind:
-        return recorded_page(by_kind["recorded"])
-    if "cohort" in by_kind:
-        return cohort_page(by_kind["cohort"])
-    runs = read_runs(by_kind["run"])
-    named = {kind: places for kind, places in by_kind.items() if kind in STUDIES}
-    near = studies_near([(run.run.folder, run.run.metrics) for run in runs], named)
-    return gait_page(runs, near)
+    """Return a figure without escaping: `inline_svg` writes it, and escapes its texts."""
+    svg = inline_svg(drawing.figure, drawing.name, drawing.title)
+    return Markup(svg)  # noqa: S704 - of `inline_svg`, which escapes

@@ -44,7 +44,7 @@ def recorded_page(folders: Sequence[Path]) -> Page:
     seen = sum(map(len, measured))
     answer = (
         f"Joint torques are known in {known} of {seen} recorded stances; muscle strengths come "
-        "from the barefoot ones."
+        "from the barefoot ones.",
     )
     facts = (Fact("Patients" if "," in patients else "Patient", patients), Fact("Date", dates))
     return Page(f"Recorded gait of {patients}", facts, answer, (), tuple(sections))

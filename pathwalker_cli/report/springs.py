@@ -9,6 +9,7 @@ from pathwalker_cli.report.content import Fact, Row, Section, Table
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.verdict import (
+    NOT_DETERMINED,
     PRESCRIBED,
     SHARE,
     NumberVerdict,
@@ -21,10 +22,10 @@ from pathwalker_cli.studies.verdict import (
 )
 
 _HEAD: Final = (
-    "spring", "take", "[N m/rad]", "[N m/deg]", "found [N m/rad]",
-    f"cost within {100 * SHARE:g} % [N m/rad]",
-    f"cost within {100 * SHARE:g} % [N m/deg]", "verdict",
+    "spring", "fit: [N m/rad] ([N m/deg])", "does as well: [N m/rad] ([N m/deg])",
+    "least effort: [N m/rad]", "how sure",
 )  # fmt: skip
+_ANY: Final = "any of the drawer: choose by fitting"
 
 _NOT_JUDGED: Final = (
     "The springs of this run were not judged (verdict: false, or a quick check): the table shows "
@@ -34,12 +35,13 @@ _NO_CHOICE: Final = "The config prescribes all springs: nothing was identified."
 
 
 def spring_section(run: ReportRun) -> Section:
-    """Return the springs of a run with orthoses: real ones to take, region, verdict."""
+    """Return the springs of a run with orthoses: real ones to fit, region, verdict."""
     verdict = run.verdict
     rows = tuple(_row(run, name) for name in STIFFNESSES)
     notes = [
-        "K_D resists dorsiflexion, K_P plantarflexion; the range is that in which the cost stays "
-        f"within {100 * SHARE:g} % of the best, all else optimal"
+        "K_D resists dorsiflexion (the shin leaning forward), K_P plantarflexion (the foot "
+        f"pointing down); does as well: the cost stays within {100 * SHARE:g} % of the best, all "
+        "else optimal"
     ]
     lines: tuple[str, ...] = ()
     facts: tuple[Fact, ...] = ()
@@ -48,8 +50,9 @@ def spring_section(run: ReportRun) -> Section:
         lines = (_NOT_JUDGED if free else _NO_CHOICE,)
     else:
         facts = tuple(_facts(verdict))
-    table = Table(_HEAD, rows, notes=tuple(notes), columns="wwnnnnnp")
-    return Section(f"Recommended springs, {run.label}", lines, facts, (table,))
+    table = Table(_HEAD, rows, notes=tuple(notes), columns="wwnnp")
+    named = "" if run.label == run.run.config.condition else f", {run.label}"
+    return Section(f"Springs to fit{named}", lines, facts, (table,))
 
 
 def recommended(run: ReportRun) -> dict[str, float]:
@@ -59,6 +62,13 @@ def recommended(run: ReportRun) -> dict[str, float]:
     else:
         chosen = {}
     return {name: chosen.get(name, _identified(run, name)) for name in STIFFNESSES}
+
+
+def left_open(run: ReportRun, name: str) -> bool:
+    """Return whether the verdict found that a spring hardly matters."""
+    verdict = run.verdict
+    spring = next((s for s in verdict.springs if s.name == name), None) if verdict else None
+    return spring is not None and spring.determined == NOT_DETERMINED
 
 
 def verdict_words(spring: NumberVerdict) -> str:
@@ -83,16 +93,15 @@ def _row(run: ReportRun, name: str) -> Row:
     take, identified, verdict = recommended(run)[name], _identified(run, name), run.verdict
     spring = next((s for s in verdict.springs if s.name == name), None) if verdict else None
     snapped = verdict.snapped.names.get(name, "") if verdict and verdict.snapped else ""
-    region = ("-", "-")
-    words = PRESCRIBED if prescribed(run, name) else "not judged"
+    region, words = "-", PRESCRIBED if prescribed(run, name) else "not judged"
     if spring is not None:
         words = verdict_words(spring)
     if spring is not None and not spring.prescribed:
         low, high = spring.region
-        region = f"{low:.1f} to {high:.1f}", f"{per_degree(low):.2f} to {per_degree(high):.2f}"
-    label = measure_of(name).label
-    cells = (label, snapped or "-", f"{take:.1f}", f"{per_degree(take):.2f}", f"{identified:.1f}",
-             *region, words)  # fmt: skip
+        region = f"{low:.1f} to {high:.1f} ({per_degree(low):.2f} to {per_degree(high):.2f})"
+    fit = f"{snapped}: ".lstrip(": ") + f"{take:.1f} ({per_degree(take):.2f})"
+    fit = _ANY if left_open(run, name) else fit
+    cells = (measure_of(name).label, fit, region, f"{identified:.1f}", words)
     return Row(cells, "good" if snapped else "")
 
 
@@ -108,8 +117,9 @@ def _facts(verdict: Verdict) -> list[Fact]:
     if snapped is None:
         real = "the patient's file lists none that can be bought (orthosis.springs)"
     elif snapped.status == "converged":
+        names = ", ".join(f"{measure_of(n).label} {s}" for n, s in snapped.names.items())
         real = (
-            f"solved again with these: cost {100 * snapped.rise:+.2g} %, "
+            f"solved again with {names}: cost {100 * snapped.rise:+.2g} %, "
             f"{snapped.walking_speed:.3f} m/s"
         )
         real = ". ".join(filter(None, (real, snapped_warning(verdict))))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import Final
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from pathwalker_cli.report.summaries import (
     landscape_of,
     spreads_of,
 )
+from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measure_of, measures_in
 from pathwalker_cli.studies.landscape.figures import Chosen, cost_figure
 from pathwalker_cli.studies.landscape.result import Landscape
@@ -33,7 +35,10 @@ from pathwalker_cli.studies.sensitivity.result import SHOWN, elasticity_text, la
 from pathwalker_cli.studies.tradeoff.figures import tradeoff_figure
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff
 from pathwalker_cli.studies.uncertainty.figures import spread_figure
-from pathwalker_cli.studies.uncertainty.result import Spread, shown_text
+from pathwalker_cli.studies.uncertainty.result import Spread, shown_text, span_text, span_words
+
+_RANKED: Final = 10
+"""Numbers whose sensitivity is shown, the strongest."""
 
 
 def study_section(study: Study, run: ReportRun) -> Section:
@@ -68,28 +73,43 @@ def _section(study: Study, run: ReportRun) -> Section:
 
 
 def _sensitivity(summary: SensitivitySummary) -> Section:
-    """Return what one per cent more of every number changes."""
-    elasticities = summary.elasticities
-    shown = [
-        m
-        for m in measures_in("studies")
-        if any(_moves(values.get(m.key)) for values in elasticities.values())
-    ]
-    rows = []
-    for place, values in elasticities.items():
-        numbers = [values.get(measure.key) for measure in shown]
-        if any(map(_moves, numbers)):
-            rows.append(Row((label_of(place), *map(elasticity_text, numbers))))
+    """Return what a change of every number does, strongest first, in words and as numbers."""
+    measures = measures_in("studies")
+    walking = [m.key for m in measures if m.key not in STIFFNESSES]  # springs may be open
+    sizes = {
+        place: max((abs(values.get(key) or 0.0) for key in walking), default=0.0)
+        for place, values in summary.elasticities.items()
+    }
+    ranked = [p for p in sorted(sizes, key=sizes.__getitem__, reverse=True) if sizes[p] >= SHOWN]
+    elasticities = {place: summary.elasticities[place] for place in ranked[:_RANKED]}
+    shown = [m for m in measures if any(_moves(v.get(m.key)) for v in elasticities.values())]
+    rows = tuple(
+        Row((label_of(place), *(elasticity_text(values.get(m.key)) for m in shown)))
+        for place, values in elasticities.items()
+    )
+    left = len(ranked) - len(rows)
     table = Table(
         ("one per cent more of", *(m.short for m in shown)),
-        tuple(rows),
+        rows,
         caption="Elasticities at the optimum, % per %; a spring moves with the others following",
         notes=(
-            f"a dot is less than {SHOWN:g}; numbers that move nothing are left out",
+            f"a dot is less than {SHOWN:g}; {left} numbers that move less stand in sensitivity.csv",
             "beyond a change of the active set the numbers no longer hold",
         ),
     )
-    return Section("Sensitivity", tables=(table,))
+    words = tuple(_in_words(place, values, shown) for place, values in elasticities.items())
+    return Section("Sensitivity, strongest first", tables=(table,), points=words)
+
+
+def _in_words(place: str, values: Mapping[str, float | None], measures: Sequence[Measure]) -> str:
+    """Return in a sentence what ten per cent more of a number do, the two strongest first."""
+    known = {m.label: values.get(m.key) or 0.0 for m in measures if m.key not in STIFFNESSES}
+    if any(map(_moves, (size for label, size in known.items() if label != "cost"))):
+        known.pop("cost", None)
+    most = sorted(known, key=lambda label: abs(known[label]), reverse=True)[:2]
+    moved = " and ".join(f"{label} by {10.0 * known[label]:+.1f} %" for label in most)
+    name = label_of(place)
+    return f"{name[:1].upper()}{name[1:]}: 10 % more changes {moved}"
 
 
 def _moves(value: float | None) -> bool:
@@ -202,10 +222,9 @@ def _uncertainty(
     summary: UncertaintySummary, values: Mapping[str, np.ndarray], spreads: Sequence[Spread]
 ) -> Section:
     """Return how far springs and gait spread when the patient's numbers are uncertain."""
-    head = ("", "unit", "base", "median", "90 % of draws", "follows most")
-    rows = (_spread_row(each, summary.spreads[each.measure.key].strongest_input)
-            for each in spreads)  # fmt: skip
     count = summary.draws - len(summary.failed)
+    head = ("", "unit", "base", "median", span_words(count), "follows most")
+    rows = (_spread_row(each, values, summary) for each in spreads)
     lines = [f"{summary.draws} draws of the uncertain numbers, {count} converged."]
     lines += [words for each in spreads if (words := _chance(each, summary.ranges))]
     lines += summary.advice
@@ -239,12 +258,15 @@ def _learnt(summary: LearnSummary) -> Section:
     return Section("What the strides say of body and cost", lines, tables=(table,))
 
 
-def _spread_row(spread: Spread, strongest: str | None) -> Row:
-    measure = spread.measure
-    low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
+def _spread_row(
+    spread: Spread, values: Mapping[str, np.ndarray], summary: UncertaintySummary
+) -> Row:
+    measure, key = spread.measure, spread.measure.key
+    strongest = summary.spreads[key].strongest_input
+    span = span_text(spread, values.get(key, np.empty(0)), summary.ranges.get(key))
     return Row((
         measure.label, measure.shown_unit,
-        shown_text(measure, spread.base), middle, f"{low} to {high}",
+        shown_text(measure, spread.base), shown_text(measure, spread.quantiles[1]), span,
         label_of(strongest) if strongest else "-",
     ))  # fmt: skip
 

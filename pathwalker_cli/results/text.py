@@ -15,10 +15,15 @@ from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, Shortfall
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import OrthosisData
 from pathwalker_cli.stride.measures import TABLES, expanded, measure_of, measures_in
+from pathwalker_cli.stride.stride import stride_of
+from pathwalker_cli.stride.unusual import unusual
 
 _AT_LIMIT: Final = 1e-3
 """Share of its range within which a value counts as sitting at a limit: interior-point solvers
 stay a little away from every bound, by far less than this."""
+
+_EXACT: Final = 1e-3
+"""Residual of the equations of motion up to which forces count as exact [N, N m]."""
 
 _WISH: Final = {"upper": "stiffer", "lower": "softer"}
 
@@ -58,6 +63,18 @@ def spring_notes(values: Mapping[str, Any], ranges: Mapping[str, tuple[float, fl
         f"N m/rad: a {_WISH[end]} one would cost less"
         for name, end in spring_ends(values, ranges).items()
     ]
+
+
+def solution_notes(solution: GaitSolution) -> list[str]:
+    """Return what to beware of in a converged solution: forces that are not exact, odd walks."""
+    notes = list(unusual(stride_of(solution.last_iterate)))
+    if solution.second_engine > _EXACT:
+        notes.append(
+            f"numeric Pinocchio finds the equations of motion violated by up to "
+            f"{solution.second_engine:.2g} N or N m between the nodes: forces and torques are no "
+            "better than that; more intervals, or transcription: collocation, are"
+        )
+    return notes
 
 
 def summary_rows(
@@ -175,7 +192,7 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
     worst, terms = solution.violations[0], solution.cost_terms
     errors = solution.reintegration
     again = f"{errors.worst_position:.1e} rad or m, {errors.worst_velocity:.1e} rad/s or m/s"
-    stages = (f"{s.name} {s.iterations} in {s.seconds:.1f} s" for s in solution.stages)
+    stages = [f"{s.name} {s.iterations} in {s.seconds:.1f} s" for s in solution.stages]
     seconds = (f"{part} {metrics[f'seconds_{part}']:.1f}" for part in ("build", "solve", "verify"))
     rows = [
         ("cost terms", " + ".join(f"{_words(n)} {v:.4g}" for n, v in terms.items() if v)),
@@ -184,7 +201,10 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
         ("re-integration error", again),
         ("second engine", f"equations of motion met within {solution.second_engine:.1e} N or N m"),
         ("balances", _balance_text(metrics["balance"])),
-        ("iterations", f"{', '.join(stages)}; {solution.last_motion.intervals} intervals at last"),
+        (
+            "iterations",
+            f"{', '.join(stages) or 'none'}; {solution.last_motion.intervals} intervals at last",
+        ),
         ("seconds", ", ".join(seconds)),
         ("dynamics, start", f"{solution.walker.backend}, {solution.start}"),
     ]

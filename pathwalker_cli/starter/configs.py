@@ -9,6 +9,7 @@ from typing import Final
 
 from pathwalker_cli.io.commented_yaml import Entry, entries
 from pathwalker_cli.paths import shipped
+from pathwalker_cli.starter.seen import Seen
 
 WIDTH: Final = 80
 """Columns of a terminal."""
@@ -98,7 +99,7 @@ class ConfigFile:
 
     def _takes(self, place: str) -> bool:
         inside = place.startswith("bounds.fallback_joint_ranges.")
-        return not self.only or place in self.only or inside
+        return not self.only or place in self.only or inside or place in self.values
 
     def _written(self, entry: Entry) -> str:
         depth = len(entry.parents) - 1
@@ -107,13 +108,14 @@ class ConfigFile:
         return commented(entry.parents[-1], value, entry.comment, depth, given=not idle)
 
 
-def config_files(with_orthosis: bool, worn: bool) -> tuple[ConfigFile, ...]:
+def config_files(seen: Seen, worn: bool) -> tuple[ConfigFile, ...]:
     """Return the configs of a new folder; C3D files are expected in c3d/.
 
     Args:
-        with_orthosis: Whether there is an orthosis.
-        worn: Whether walks with it are recorded.
+        seen: What is known of the child.
+        worn: Whether walks with an orthosis are recorded.
     """
+    with_orthosis = seen.with_orthosis
     patient = {"patient": "patient.yaml"}
     recorded = {**patient, "conditions": "[barefoot]", "c3d.barefoot": "[c3d/barefoot]"}
     base, studies = {"base": "mapd-barefoot.yaml", "check": "[strengths]"}, _STUDIES
@@ -123,7 +125,10 @@ def config_files(with_orthosis: bool, worn: bool) -> tuple[ConfigFile, ...]:
         base, studies = {"base": "mapd-orthosis.yaml"}, {**_SPRING_STUDIES, **_STUDIES}
     problems = _PROBLEMS if with_orthosis else _PROBLEMS[:1]
     return (
-        *(ConfigFile(name, purpose, patient, keys) for name, purpose, keys in problems),
+        *(
+            ConfigFile(name, purpose, patient | seen.config_values(name == "mapd-orthosis"), keys)
+            for name, purpose, keys in problems
+        ),
         *(
             ConfigFile(name, purpose, base, idle="quantities.recorded" * (name == "uncertainty"))
             for name, purpose in studies.items()

@@ -24,6 +24,7 @@ from pathwalker_cli.patient.blocks import OrthosisData
 from pathwalker_cli.patient.proportions import ANKLE_HEIGHT, HEEL_SHARE, TOE_SHARE, default_length
 from pathwalker_cli.starter.child import Child
 from pathwalker_cli.starter.configs import WIDTH, comment, commented, config_files, unbroken
+from pathwalker_cli.starter.seen import Seen
 
 _LENGTHS: Final = {
     "pelvis": "Length of the pelvis segment.",
@@ -62,23 +63,22 @@ class Step:
     commands: tuple[str, ...] = ()
 
 
-def folder_files(
-    child: Child, with_orthosis: bool, example: bool, walks: bool = False
-) -> dict[str, str]:
+def folder_files(child: Child, seen: Seen, example: bool, walks: bool = False) -> dict[str, str]:
     """Return the texts of a new folder by file name.
 
     Args:
         child: The child.
-        with_orthosis: Whether there is an orthosis.
+        seen: What was seen and examined of it.
         example: Whether made recordings come with it.
         walks: Whether recorded barefoot walks come with it.
     """
-    files = {"patient.yaml": _patient(child, with_orthosis, {})}
+    with_orthosis = seen.with_orthosis
+    files = {"patient.yaml": _patient(child, seen, {})}
     purposes = {"patient.yaml": "the child: begin here"}
     if with_orthosis:
         files["orthosis.yaml"] = _orthosis({})
         purposes["orthosis.yaml"] = "the orthosis and its springs"
-    for file in config_files(with_orthosis, with_orthosis and not walks):
+    for file in config_files(seen, _is_recorded(seen, walks)):
         files[file.name] = _environment().get_template("config.yaml.j2").render(file=file)
         purposes[file.name] = file.purpose[0].lower() + file.purpose[1:].split(". ")[0].rstrip(".")
     if example:
@@ -86,7 +86,7 @@ def folder_files(
     readme = _environment().get_template("README.txt.j2")
     if walks:
         purposes["c3d/"] = "recordings"
-    steps = next_steps(with_orthosis, example, walks)
+    steps = next_steps(seen, example, walks)
     shown = {
         name: textwrap.fill(text, WIDTH - 26).replace("\n", "\n" + " " * 26)
         for name, text in purposes.items()
@@ -97,19 +97,25 @@ def folder_files(
     return files
 
 
-def next_steps(with_orthosis: bool, example: bool, walks: bool = False) -> tuple[Step, ...]:
+def _is_recorded(seen: Seen, walks: bool) -> bool:
+    """Return whether walks with an orthosis may be recorded: those that were given are barefoot."""
+    return seen.brace == "worn" or (seen.brace == "planned" and not walks)
+
+
+def next_steps(seen: Seen, example: bool, walks: bool = False) -> tuple[Step, ...]:
     """Return what to do with a new folder, one command after the other.
 
     Args:
-        with_orthosis: Whether there is an orthosis.
+        seen: What was seen and examined of the child.
         example: Whether made recordings come with it.
         walks: Whether recorded barefoot walks come with it.
     """
+    with_orthosis = seen.with_orthosis
     conditions = ("barefoot", "orthosis") if with_orthosis else ("barefoot",)
     problems = [f"mapd-{condition}" for condition in conditions]
     imports = tuple(
         f"pathwalker import c3d/{c} --patient . --condition {c} -o recordings/{c}"
-        for c in (conditions[:1] if walks else conditions)
+        for c in (conditions if _is_recorded(seen, walks) else conditions[:1])
     )
     recorded: tuple[Step, ...] = (
         Step("Turn the C3D files into joint angles, events and forces.", imports),
@@ -122,7 +128,7 @@ def next_steps(with_orthosis: bool, example: bool, walks: bool = False) -> tuple
     fill_in = "Fill in patient.yaml" + (" and orthosis.yaml." if with_orthosis else ".")
     if not example and not walks:
         c3d = "With C3D recordings: put them into c3d/barefoot"
-        c3d += " and c3d/orthosis" if with_orthosis else ""
+        c3d += " and c3d/orthosis" if _is_recorded(seen, walks) else ""
         recorded = _begun(recorded, f"{c3d}. Without any, go on with step 5.")
     check = f"pathwalker check patient.yaml {' '.join(f'{name}.yaml' for name in problems)}"
     solves = tuple(f"pathwalker solve {n} {n}.yaml --out runs/{n}" for n in problems)
@@ -164,12 +170,12 @@ def explained_keys() -> dict[str, dict[str, str]]:
     """Return what the templates say of every key of patient and orthosis, by dotted key."""
     patient: dict[str, str] = {}
     orthosis: dict[str, str] = {}
-    _patient(Child("child", 9.0, 29.0, 1.31), True, patient)
+    _patient(Child("child", 9.0, 29.0, 1.31), Seen(), patient)
     _orthosis(orthosis)
     return {"patient": patient, "orthosis": orthosis}
 
 
-def _patient(child: Child, with_orthosis: bool, explained: dict[str, str]) -> str:
+def _patient(child: Child, seen: Seen, explained: dict[str, str]) -> str:
     """Return the text of the patient's file; take note of what is said of each key."""
     foot = child.length("foot")
 
@@ -179,7 +185,10 @@ def _patient(child: Child, with_orthosis: bool, explained: dict[str, str]) -> st
 
     return _environment().get_template("patient.yaml.j2").render(
         child=child,
-        with_orthosis=with_orthosis,
+        with_orthosis=seen.with_orthosis,
+        examined=lambda name, usual: (
+            _sides(seen.examination[name]) if name in seen.examination else usual
+        ),
         lengths=_LENGTHS,
         entry=partial(_entry, Patient, explained),
         num=lambda value: f"{value:g}",
@@ -268,14 +277,14 @@ def check_new(folder: Path) -> None:
 
 
 def write_folder(
-    folder: Path, child: Child, with_orthosis: bool, example: bool, walks: Sequence[Path] = ()
+    folder: Path, child: Child, seen: Seen, example: bool, walks: Sequence[Path] = ()
 ) -> None:
     """Write a new folder for a child.
 
     Args:
         folder: The folder; new or empty.
         child: The made-up child to begin with.
-        with_orthosis: Whether there is an orthosis.
+        seen: What was seen and examined of it.
         example: Whether to make C3D files of the child.
         walks: C3D files of barefoot walks to copy into it.
 
@@ -285,7 +294,7 @@ def write_folder(
     """
     check_new(folder)
     with staged_folder(folder) as staging:
-        for name, text in folder_files(child, with_orthosis, example, bool(walks)).items():
+        for name, text in folder_files(child, seen, example, bool(walks)).items():
             (staging / name).write_text(text, encoding="utf-8")
         for walk in walks:
             place = staging / "c3d" / "barefoot"
@@ -299,4 +308,4 @@ def write_folder(
         if example:
             from pathwalker_cli.starter.example import write_example
 
-            write_example(staging, patient, CONDITIONS if with_orthosis else ("barefoot",))
+            write_example(staging, patient, CONDITIONS if seen.with_orthosis else ("barefoot",))

@@ -114,6 +114,11 @@ class Stride(Sampled):
         """Distance over time [m/s]."""
         return self.distance / self.duration
 
+    @property
+    def velocity(self) -> np.ndarray:
+        """Generalised velocities, of a recording from its posture [m/s, rad/s], shape (n, 10)."""
+        return np.gradient(self.q, self.time, axis=0) if self.v is None else self.v
+
     def known(self, name: str) -> np.ndarray:
         """Return an array by its name.
 

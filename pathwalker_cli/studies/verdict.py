@@ -26,6 +26,9 @@ _ROUGHLY: Final = 0.75
 """Share of the range of springs up to which a region still says something."""
 
 
+NOT_DETERMINED: Final = "not determined"
+
+
 @dataclass(frozen=True)
 class NumberVerdict:
     """What is known of one identified number; the others follow when it moves.
@@ -79,7 +82,7 @@ class NumberVerdict:
         if self.prescribed:
             return "prescribed"
         if any(self.again) or self.width > _ROUGHLY:
-            return "not determined"
+            return NOT_DETERMINED
         if self.limit:
             return "set by its limit"
         return "determined" if self.width <= _DETERMINED else "roughly determined"

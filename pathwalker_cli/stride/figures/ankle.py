@@ -70,7 +70,7 @@ def _title(series: GaitSeries, side: Side) -> str:
 
 
 def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figure:
-    """Return the net ankle torque over the ankle angle of each side, with its mean slope.
+    """Return the net ankle torque over the ankle angle of each side, with its slope under load.
 
     Dorsiflexion is positive, and so is the plantarflexing torque of muscles and orthosis.  The
     slope is that of `ankle_profile.ankle_torque_slope`, over the thick part of the path.
@@ -82,13 +82,13 @@ def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figu
         style.dress(ax, f"{side.capitalize()} ankle", _ANGLE, _TORQUE if i == 0 else "")
     bearing = style.entry("foot flat or on its toe", linewidth=1.6)
     other = style.entry("swing and heel contact", linewidth=0.6)
-    slope = style.entry("mean slope", color="black", linewidth=0.8, linestyle=":")
+    slope = style.entry("slope of the thick part", color="black", linewidth=0.8, linestyle=":")
     style.legend(fig, [bearing, other, slope])
     return fig
 
 
 def _draw_profile(ax: Axes, series: GaitSeries, side: Side) -> None:
-    """Draw the torque-angle path of one ankle and its mean slope."""
+    """Draw the torque-angle path of one ankle and its slope under load."""
     name = f"ankle_{SUFFIX[side]}"
     angle = -series.column(name)
     torque = series.net_torque[:, COORDINATES.index(name)]

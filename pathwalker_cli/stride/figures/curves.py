@@ -1,7 +1,7 @@
-"""What is drawn over the gait cycle of a side: angles, forces, moments and activations.
+"""What is drawn over the gait cycle of a side: angles, forces, moments, powers and activations.
 
 Flexion, dorsiflexion and forward lean are positive angles, as gait laboratories plot them; moments
-are internal ones, extension and plantarflexion positive.
+are internal ones, extension and plantarflexion positive; power that a joint gives is positive.
 """
 
 from __future__ import annotations
@@ -141,6 +141,16 @@ def _moment(joint: str, label: str) -> CycleCurve:
     )
 
 
+def _power(joint: str) -> CycleCurve:
+    def raw(stride: Stride, side: Side) -> np.ndarray:
+        row = COORDINATES.index(f"{joint}_{SUFFIX[side]}")
+        return (stride.known("net_torque") * stride.velocity)[:, [row]]
+
+    return CycleCurve(
+        f"power_{joint}", f"{joint} power", "generated + [W/kg]", raw, lambda w: 1.0 / w.total_mass
+    )
+
+
 def _activation(joint: str, up: str, down: str) -> CycleCurve:
     """Return the activation of an antagonistic pair: one upward, the other downward."""
     midline = joint not in LEG_JOINTS
@@ -173,6 +183,7 @@ MOMENTS: Final = (
     _moment("knee", "extension [N m/kg]"),
     _moment("ankle", "plantarflexion [N m/kg]"),
 )
+POWERS: Final = tuple(map(_power, LEG_JOINTS))
 # `lumbar_flexion` extends the trunk, see `conventions.GENERATORS`.
 ACTIVATIONS: Final = (
     *(_activation(joint, "extension", "flexion") for joint in LEG_JOINTS),

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.markers import TICKDOWN
 
 from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side
 from pathwalker_cli.stride.figures import style
@@ -22,7 +23,7 @@ from pathwalker_cli.stride.figures.curves import (
     Reference,
 )
 from pathwalker_cli.stride.series import GaitSeries
-from pathwalker_cli.stride.stride import own_cycle, stride_of
+from pathwalker_cli.stride.stride import Stride, contacts, own_cycle, stride_of
 
 _ANGLES: Final = {"pelvis_tilt_*": "Pelvis", "hip_*": "Hip", "knee_*": "Knee", "ankle_*": "Ankle",
                   "lumbar_*": "Trunk against pelvis"}  # fmt: skip
@@ -49,7 +50,9 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
 
     Internal moments, of muscles, tissue and orthosis on the joint, over mass with the orthosis;
     extension and plantarflexion are positive.  Thin lines at the ankle are the part of the
-    orthosis, dotted ones that of passive tissue.
+    orthosis, dotted ones that of passive tissue.  Ticks above mark where heel or toe of the own
+    foot comes down or leaves the ground: a rigid foot changes its support at once, and moments
+    have their teeth there on any mesh.
     """
     bands, fig = reference.moments if reference else {}, style.new_figure(2.9)
     panels = fig.subplots(2, 2).ravel()
@@ -59,6 +62,14 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
         for side, torque in zip(SIDES, torques.T, strict=True):
             _draw_side(panels[2], series, side, torque, linewidth=0.7)
         handles.append(style.entry("thin: orthosis alone", linewidth=0.7))
+    stride = stride_of(series)
+    for ax in panels[: len(MOMENTS)]:
+        for side in SIDES:
+            ticks = {"marker": TICKDOWN, "markersize": 3.5, "linestyle": ""}
+            at = support_changes(stride, side)
+            look = style.side_line(side) | ticks
+            ax.plot(at, np.ones_like(at), transform=ax.get_xaxis_transform(), **look)
+    handles.append(style.entry("ticks: new support", marker=TICKDOWN, linestyle=""))
     dotted = {"linewidth": 0.9, "linestyle": ":"}
     for ax, curve, joint in zip(panels, MOMENTS, LEG_JOINTS, strict=False):
         for side in SIDES:
@@ -68,6 +79,15 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
         handles.append(style.entry("dotted: tissue alone", **dotted))
     style.legend_panel(panels[-1], handles)
     return fig
+
+
+def support_changes(stride: Stride, side: Side) -> np.ndarray:
+    """Return where a heel or toe of a foot meets or leaves the ground in its own cycle [%]."""
+    walker, ends = stride.walker, np.cumsum([*stride.phase_durations.values()])
+    foot = contacts(walker, (*stride.phase_durations,))[:, walker.pattern.rows(side)]
+    changed = (foot != np.roll(foot, -1, axis=0)).any(axis=1)
+    later = (ends[changed] - stride.strike(side)) % stride.duration
+    return np.sort(100.0 * later / stride.duration)
 
 
 def ground_forces(series: GaitSeries, reference: Reference | None = None) -> Figure:

@@ -1,4 +1,4 @@
-"""Figures as SVG inside an HTML page: no clash of names, words for those who cannot see them."""
+"""Figures as SVG: inside an HTML page, or with letters as outlines for what knows no fonts."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from pathwalker_cli.stride.figures.style import STYLE
 
 _SVG: Final = "http://www.w3.org/2000/svg"
+ET.register_namespace("", _SVG)
 _HREF: Final = "{http://www.w3.org/1999/xlink}href"
 _LOCAL: Final = re.compile(r"url\(#([^)]+)\)")
 _PLACES: Final = frozenset({"d", "x", "y", "transform"})
@@ -33,13 +34,7 @@ def inline_svg(figure: Figure, name: str, title: str) -> str:
         name: A name that no other figure of the page has; letters, digits and "-".
         title: What the figure shows, in words.
     """
-    buffer = io.StringIO()
-    with mpl.rc_context(STYLE):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    root = ET.fromstring(buffer.getvalue())  # noqa: S314 - Matplotlib has just written it
-    for parent, child in list(_pairs(root)):
-        if child.tag in (f"{{{_SVG}}}metadata", f"{{{_SVG}}}style"):
-            parent.remove(child)
+    root = _drawn(figure)
     for element in root.iter():
         _localise(element, name)
     for key in ("width", "height", "version"):
@@ -50,8 +45,24 @@ def inline_svg(figure: Figure, name: str, title: str) -> str:
     words = ET.Element(f"{{{_SVG}}}title")
     words.text = title
     root.insert(0, words)
-    ET.register_namespace("", _SVG)
     return ET.tostring(root, encoding="unicode")
+
+
+def outlined_svg(figure: Figure) -> bytes:
+    """Return a figure made under `style.STYLE` as an SVG file in which letters are outlines."""
+    return ET.tostring(_drawn(figure, outlined=True))
+
+
+def _drawn(figure: Figure, outlined: bool = False) -> ET.Element:
+    """Return a figure as SVG without what Matplotlib says of itself."""
+    buffer = io.StringIO()
+    with mpl.rc_context(STYLE | ({"svg.fonttype": "path"} if outlined else {})):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    root = ET.fromstring(buffer.getvalue())  # noqa: S314 - Matplotlib has just written it
+    for parent, child in list(_pairs(root)):
+        if child.tag in (f"{{{_SVG}}}metadata", f"{{{_SVG}}}style"):
+            parent.remove(child)
+    return root
 
 
 def _pairs(root: ET.Element) -> Iterator[tuple[ET.Element, ET.Element]]:

@@ -15,7 +15,11 @@ from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.stride.stride import OwnCycle
 
 COLUMN: Final = 3.35
-"""Width of every figure [in]: a column of a journal, 85 mm."""
+"""Width of a figure [in], unless it is one of a page: a column of a journal, 85 mm."""
+PAGE: Final = 7.4
+"""Width of a figure across a page [in]: A4 between its margins, 188 mm."""
+PANEL: Final = PAGE / 4.0
+"""Width of one of four figures side by side on a page [in]."""
 TEXT: Final = 7.0
 """Size of all text [pt]; figures are printed as wide as they are drawn."""
 
@@ -53,9 +57,9 @@ STYLE: Final[dict[Any, Any]] = {
 """Settings of Matplotlib under which figures are made and saved."""
 
 
-def new_figure(height: float) -> Figure:
-    """Return an empty figure of this height [in], as wide as a column."""
-    return Figure(figsize=(COLUMN, height), layout="constrained")
+def new_figure(height: float, width: float = COLUMN, laid_out: bool = True) -> Figure:
+    """Return an empty figure of this height and width [in], whose panels Matplotlib lays out."""
+    return Figure(figsize=(width, height), layout="constrained" if laid_out else None)
 
 
 def dress(ax: Axes, title: str = "", x: str = "", y: str = "") -> None:

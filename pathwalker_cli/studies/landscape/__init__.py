@@ -68,7 +68,7 @@ class Axis(YamlModel):
 class LandscapeStudy(NeighbourStudy):
     """A landscape around the optimum of a problem with orthoses."""
 
-    side: Literal["right", "left", "both"] = "right"
+    side: Literal["right", "left", "both"] = "both"
     dorsiflexion: Axis = Axis()
     plantarflexion: Axis = Axis()
     tolerance: Annotated[float, Quantity("", 1e-4, 1.0, above="is it in percent?")] = 0.05
@@ -82,13 +82,16 @@ class LandscapeStudy(NeighbourStudy):
         return SIDES if self.side == "both" else (self.side,)
 
 
-def axis_values(axis: Axis, allowed: tuple[float, float], name: str) -> np.ndarray:
+def axis_values(
+    axis: Axis, allowed: tuple[float, float], name: str, real: Sequence[float] = ()
+) -> np.ndarray:
     """Return the values of an axis, rising [N m/rad], shape (n,).
 
     Args:
         axis: What was asked for.
         allowed: Lowest and highest stiffness that the base allows [N m/rad].
         name: Key of the axis, for the message.
+        real: Springs that exist [N m/rad]: the value next to each gives way to it.
 
     Raises:
         ConfigError: If the ends are upside down.
@@ -103,7 +106,11 @@ def axis_values(axis: Axis, allowed: tuple[float, float], name: str) -> np.ndarr
             mend="give both ends: what is left out is the range of the base",
         )  # fmt: skip
     space = np.geomspace if axis.spacing == "logarithmic" else np.linspace
-    return np.asarray(space(low, high, axis.points))
+    values = np.asarray(space(low, high, axis.points))
+    for spring in real:
+        if low <= spring <= high:
+            values[np.argmin(np.abs(values - spring))] = spring
+    return values
 
 
 Springs = tuple[tuple[Unknown, ...], ...]
@@ -134,8 +141,11 @@ def varied_springs(study: LandscapeStudy, unknowns: Sequence[Unknown]) -> Spring
 def _axes(study: LandscapeStudy, solver: GaitSolver) -> tuple[Springs, list[np.ndarray]]:
     """Return the unknowns that are varied, and the values of both axes [N m/rad]."""
     springs, ranges = varied_springs(study, solver.walker.unknowns), solver.bounds.ranges
+    orthosis = solver.walker.patient.orthosis
+    lists = None if orthosis is None else orthosis.springs
+    real = {k: [s.stiffness for s in getattr(lists, k)] if lists else [] for k in _KINDS}
     values = [
-        axis_values(getattr(study, kind), ranges[unknowns[0].name], kind)
+        axis_values(getattr(study, kind), ranges[unknowns[0].name], kind, real[kind])
         for kind, unknowns in zip(_KINDS, springs, strict=True)
     ]
     return springs, values

@@ -169,7 +169,7 @@ def _plane(ax: Axes, landscape: Landscape, small: bool = False) -> None:
     ):
         logarithmic = values[0] > 0.0 and values[-1] / values[0] >= _LOGARITHMIC
         set_scale("log" if logarithmic else "linear")
-        ticks = np.unique(values[[0, values.size // 2, -1]]) if small else values
+        ticks = np.unique(values[[0, (values.size - 1) // 2, -1]]) if small else values
         axis.set_major_locator(FixedLocator(ticks.tolist()))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))

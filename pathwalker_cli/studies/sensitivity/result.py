@@ -165,12 +165,12 @@ def sensitivity_lines(result: Sensitivities) -> Iterator[str]:
     yield ""
     yield (
         f"'.' is less than {SHOWN:g}; a spring moves with the others following. "
-        f"{result.active} inequalities are active, {result.doubtful} of all are in doubt: "
-        "beyond a change of the active set the numbers no longer hold."
+        f"{result.active} limits hold the optimum; of {result.doubtful} it is not clear whether "
+        "they do. Beyond a step at which a limit begins or ceases to hold, the numbers are wrong."
     )
     yield f"{len(result.rows)} numbers in {result.seconds:.1f} s, no problem solved again."
     for check in result.checks:
-        kept = f"{check.changed} inequalities change" if check.changed else "the active set stays"
+        kept = f"{check.changed} limits change" if check.changed else "the same limits hold"
         yield (
             f"check of {label_of(check.place)}: within {100 * agreement(result, check):.2g} % of "
             f"two solves at {100 * check.step:g} % more and less ({kept}; {check.iterations} "

@@ -36,6 +36,9 @@ _LISTED: Final = 5
 QUANTILES: Final = (0.05, 0.5, 0.95)
 """What stands for the distribution of a measure: the middle, and the range of 90 % of draws."""
 
+ENOUGH: Final = 20
+"""Draws from which on the range of 90 % of them leaves some out; of fewer, all are told."""
+
 _OPEN: Final = 0.25
 """Share of the allowed range that draws must cover for a spring to count as not determined."""
 
@@ -153,6 +156,27 @@ def _spread(result: Uncertainty, measure: Measure) -> Spread:
     )
 
 
+def span_words(draws: int) -> str:
+    """Return what the range of a measure is called: few draws have no tails."""
+    return "90 % of draws" if draws >= ENOUGH else f"range of {draws}"
+
+
+def span_text(spread: Spread, values: np.ndarray, limits: tuple[float, float] | None) -> str:
+    """Return the range of a measure; the one limit that holds all draws is named as such.
+
+    Args:
+        spread: How the measure spreads.
+        values: Its values, see `Uncertainty.values`.
+        limits: Its allowed range, if it has one.
+    """
+    low, _, high = spread.quantiles
+    if 0 < len(values) < ENOUGH:
+        low, high = float(values.min()), float(values.max())
+    if limits is not None and low == high and limits[0] < limits[1] and low in limits:
+        return f"all at {'lower' if low == limits[0] else 'upper'} limit"
+    return f"{shown_text(spread.measure, low)} to {shown_text(spread.measure, high)}"
+
+
 def rank_correlations(inputs: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return Spearman's rank correlation of every input with a measure, shape (m,).
 
@@ -255,9 +279,9 @@ def uncertainty_lines(result: Uncertainty) -> Iterator[str]:
     )
     if converged:
         yield ""
-        yield _line("", "base", "median", "90 % of draws", "follows most", "rank corr.")
+        yield _line("", "base", "median", span_words(converged), "follows most", "rank corr.")
         all_spreads = spreads(result)
-        yield from map(_row, all_spreads)
+        yield from (_row(result, spread) for spread in all_spreads)
         yield ""
         yield from _limits(result, all_spreads)
         yield from _advice(result, all_spreads)
@@ -268,13 +292,14 @@ def uncertainty_lines(result: Uncertainty) -> Iterator[str]:
     yield _seconds(result)
 
 
-def _row(spread: Spread) -> str:
+def _row(result: Uncertainty, spread: Spread) -> str:
     measure = spread.measure
+    span = span_text(spread, result.values(measure.key), result.ranges.get(measure.key))
     unit = f" [{measure.shown_unit}]" if measure.shown_unit else ""
-    low, middle, high = (shown_text(measure, value) for value in spread.quantiles)
+    middle = shown_text(measure, spread.quantiles[1])
     strength = "" if spread.strength is None else f"{spread.strength:+.2f}"
     base, label = shown_text(measure, spread.base), f"{measure.label}{unit}"
-    return _line(label, base, middle, f"{low} to {high}", spread.place or "-", strength)
+    return _line(label, base, middle, span, spread.place or "-", strength)
 
 
 def shown_text(measure: Measure, value: float) -> str:
@@ -312,6 +337,7 @@ def _advice(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
     rows = [i for i, entry in enumerate(result.draws.inputs)
             if entry.distribution is None and not entry.place.startswith(COST)]  # fmt: skip
     level = chance_level(len(result.converged), len(result.draws.inputs))
+    most = "90 %" if len(result.converged) >= ENOUGH else "nearly all"
     for spread in all_spreads:
         low, high = result.ranges.get(spread.measure.key, (0.0, 0.0))
         if not rows or not low < high:
@@ -323,7 +349,7 @@ def _advice(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
         text = (
             f"{label}: {'not determined' if share > _OPEN else found} by what was learnt, "
             f"{spread.quantiles[0]:.0f} to "
-            f"{spread.quantiles[2]:.0f} {unit} in 90 % of the draws"
+            f"{spread.quantiles[2]:.0f} {unit} in {most} of the draws"
         )
         sizes = np.nan_to_num(np.abs(spread.correlations[rows]))
         if sizes.any():
