@@ -69,11 +69,7 @@ class Prior(YamlModel):
 
 
 class LearntNumber(Prior):
-    """A number after the recordings were looked at.
-
-    Args:
-        learnt: Its value [its unit].
-    """
+    """A number after the recordings were looked at."""
 
     learnt: Amount
 

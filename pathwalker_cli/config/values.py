@@ -19,10 +19,7 @@ PLACES: Final = (("variation", "scale"), ("variation", "shift"), ("numbers",), (
 
 
 def apply_change(mapping: dict[str, Any], change: str) -> KeyPath:
-    """Put one override "a.b=value" into a mapping; the value is read as YAML.
-
-    Returns:
-        The key that was overridden.
+    """Put one override "a.b=value" (value: YAML) into a mapping; return its key.
 
     Raises:
         ConfigError: If it is no override, or there is no such place.
@@ -116,12 +113,7 @@ def _entries(prefix: str, content: Mapping[str, Any]) -> Iterator[tuple[str, Any
 
 
 def _holder(mapping: dict[str, Any], key: str, where: str) -> tuple[dict[str, Any], str]:
-    """Return the mapping that holds a dotted key, and the last part of the key.
-
-    Args:
-        mapping: The outermost mapping; what lacks on the way is put into it.
-        key: The key, e.g. "mesh.degree".
-        where: Origin of the key, for the message.
+    """Return the mapping that holds a dotted key, made where it lacks, and the key's last part.
 
     Raises:
         ConfigError: If there is a value on the way that holds no keys.

@@ -19,14 +19,7 @@ from pathwalker_cli.ocp.problem import Sample
 def cost_terms(
     motion: PhasedMotion, costs: Costs, weights: Weights, samples: tuple[Sample, ...] = ()
 ) -> dict[str, float]:
-    """Return the terms of the objective by name; they add up to the cost.
-
-    Args:
-        motion: A whole stride of a problem with these costs.
-        costs: The terms.
-        weights: Their weights.
-        samples: Recorded instants of a passage; without them the stride is a prediction.
-    """
+    """Return the terms of the objective of a whole stride by name; they add up to the cost."""
     totals = dict(zip(costs.integrals, motion.phases[-1].integrals[-1], strict=True))
     terms = prediction_terms(motion, totals, costs, weights)
     if samples:
@@ -49,13 +42,7 @@ def prediction_terms(
 def goal_values(
     motion: PhasedMotion, walker: Walker, comfort_ranges: Mapping[str, tuple[float, float]]
 ) -> dict[str, float]:
-    """Return the value of every goal, without weights; of discomfort only if ranges are given.
-
-    Args:
-        motion: A whole stride.
-        walker: Who walks; its unknowns take the values of the motion's parameters.
-        comfort_ranges: Comfortable range by coordinate [rad].
-    """
+    """Return every goal of a whole stride without its weight; discomfort only with ranges [rad]."""
     walker = walker.with_parameters(motion.parameters)
     names = tuple(name for name in GOALS if name != "discomfort" or comfort_ranges)
     costs = Costs(names, comfort_ranges=comfort_ranges)

@@ -35,13 +35,9 @@ def by_duration(
 def refined(
     meshes: tuple[np.ndarray, ...], errors: Reintegration, config: MeshConfig, share: float = 1.0
 ) -> tuple[np.ndarray, ...]:
-    """Return a mesh in which intervals that miss the tolerances are split.
+    """Return a mesh in which intervals above a share of the tolerances are split.
 
-    Args:
-        meshes: The mesh that was used.
-        errors: Errors on it.
-        config: Tolerances; its degree is the order of the error in the length of an interval.
-        share: Share of the tolerances above which an interval is split.
+    The degree is the order of the error in the length of an interval.
     """
     result = []
     for mesh, position, velocity in zip(meshes, errors.position, errors.velocity, strict=True):

@@ -115,8 +115,6 @@ class GaitProblem:
 
     Args:
         walker: The walker; its unknowns are the free parameters.
-        form: What the phases are.
-        costs: The terms of the objective.
     """
 
     def __init__(self, walker: Walker, form: Form = "stride", costs: Costs | None = None) -> None:
@@ -176,10 +174,7 @@ class GaitProblem:
     ) -> np.ndarray:
         """Return the numbers that go with `MultiPhaseProblem.shared`.
 
-        Args:
-            weights: Weight of every cost term by name.
-            friction: Coefficient of friction.
-            orthosis_share: Share of the orthosis' fixed torques, below 1 to ease in a start.
+        Below 1, `orthosis_share` eases in the orthosis' fixed torques.
         """
         return self.constants.values(weights, friction, orthosis_share)
 

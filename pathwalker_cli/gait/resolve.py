@@ -47,8 +47,6 @@ class Optimum:
 
     Args:
         solver: The solver of its case; it brings in walker, bounds and numbers.
-        program: The nonlinear program.
-        result: How the solve of it ended.
     """
 
     solver: GaitSolver
@@ -128,8 +126,6 @@ class Resolver:
     """Solves problems near an optimum on its mesh; derivatives and solver are built once.
 
     Args:
-        case: The case of the optimum.
-        motion: Its motion.
         multipliers: Its multipliers; without them the optimum is solved anew from its motion.
         tolerance: Optimality tolerance of all solves; that of the config if left out.
         observer: Hears every iteration, and may end a solve.
@@ -178,16 +174,13 @@ class Resolver:
         return Optimum(self._solver, self._program, result)
 
     def resolve(self, case: Case, start: Optimum | None = None, insist: bool = True) -> Optimum:
-        """Solve a neighbour.
+        """Solve a neighbour, converged or not.
 
         Args:
             case: What differs; problem, model and degree must be those of the optimum.
             start: Neighbour to begin with; the optimum if left out.
             insist: Whether to try without multipliers, which may take long, where these do not
                 lead to a solution.
-
-        Returns:
-            Where the solve ended, converged or not.
         """
         start = start or self.optimum
         solver = GaitSolver(case)

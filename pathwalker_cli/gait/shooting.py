@@ -66,7 +66,6 @@ class ShootingSolution:
 
     Args:
         status: "converged" or the reason why not.
-        cost: Value of the objective.
         running_costs: Integrals over the whole motion by name, without weights.
         nodes: Phase durations, parameters, and states, activations and excitations at the nodes.
         motion: The motion between the nodes, integrated anew with equation (2) itself.
@@ -76,8 +75,6 @@ class ShootingSolution:
         violations: Largest violations, largest first.
         rounds: The rounds, in each of which steps were chosen anew.
         seconds_build: Wall seconds for blocks and programs.
-        nlp: What the nonlinear solver returned last.
-        program: The last program.
     """
 
     status: str
@@ -146,14 +143,8 @@ def solve_shooting(
     """Solve a gait problem by direct multiple shooting on the mesh of a motion.
 
     In every round the integration steps are chosen along the last motion and kept during the
-    solve; the kink of equation (2) is rounded off less from round to round.
-
-    Args:
-        gait: The problem.
-        numbers: Its numbers; excitations are bounded to [0, 1] here.
-        motion: Where to begin, with the mesh to solve on; a solution by collocation.
-        settings: Settings.
-        observer: Called after every iteration with the name of the round.
+    solve; the kink of equation (2) is rounded off less from round to round.  Excitations are
+    bounded to [0, 1] here.
 
     Raises:
         NotConvergedError: If a motion can not be integrated.
@@ -267,8 +258,7 @@ class _Search:
 def solve_by_shooting(solver: GaitSolver, warm_start: PhasedMotion | None = None) -> GaitSolution:
     """Solve by collocation, then by multiple shooting on the same mesh.
 
-    Returns:
-        The solution by multiple shooting; that by collocation if it did not converge.
+    Where shooting does not converge, the solution by collocation is returned.
 
     Raises:
         ConfigError: If the study fits a recording: shooting solves predictions only.

@@ -76,9 +76,7 @@ class StageRecord:
     Args:
         name: "tracking", "first mesh", "refined 1", "helped", ...
         status: "converged" or the reason why not.
-        intervals: Mesh intervals.
         unknowns: Size of the nonlinear program.
-        iterations: Iterations.
         seconds: Wall seconds of the solve.
         seconds_functions: Part of them in function evaluations.
     """
@@ -106,11 +104,9 @@ class LocalOptimum:
         start: Number of the start; 0 is the study's own.
         description: The start in words.
         status: "converged" or the reason why not.
-        cost: Value of the objective.
         walking_speed: Walking speed [m/s].
         stiffness: K_D right, left, K_P right, left [N m/rad]; empty when barefoot.
         numbers: Value of every number that was free to choose, by name [SI].
-        iterations: Iterations over all stages.
         seconds: Wall seconds.
     """
 
@@ -138,18 +134,14 @@ class GaitSolution:
 
     Args:
         case: What was asked for, and for whom.
-        walker: Who walks.
         status: "converged" or the reason why not.
         last_motion: The last iterate.
         nlp: What the nonlinear solver returned last.
         bounds: Bounds that were used and where they come from.
-        cost: Value of the objective.
         cost_terms: Its terms by name; they add up to the cost.
         violations: Largest violations, largest first.
-        active: Active bounds.
         reintegration: Errors of an independent integrator.
         start: Where the search began.
-        stages: The stages.
         seconds: Wall seconds by part: build, solve, verify.
         optima: Where all starts ended, best first; empty for a single start.
         shortfall: Why no motion was found, where that was looked for.

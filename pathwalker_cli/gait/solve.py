@@ -198,12 +198,7 @@ class GaitSolver:
         )
 
     def solve(self, warm_start: PhasedMotion | None = None) -> GaitSolution:
-        """Solve the problem.
-
-        Args:
-            warm_start: An earlier motion of the same condition to begin with; otherwise the stride
-                of the config is tracked first.
-        """
+        """Solve the problem from a motion of this condition, or by way of the config's stride."""
         solver, tolerance = self.config.solver, self.config.solver.tolerance
         self.shortfall = None
         if self.config.mesh.refinements:

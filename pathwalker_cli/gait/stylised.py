@@ -98,11 +98,6 @@ def stylised_trajectory(walker: Walker, gait: StylisedGait, samples: int = 201) 
     Feet are planted, roll over the toe, swing and land on the heel; the pelvis moves on at
     constant speed and height, and the leg angles follow from the leg's geometry.
 
-    Args:
-        walker: Whose proportions to use.
-        gait: Shape of the gait.
-        samples: Number of instants over the stride.
-
     Returns:
         Columns `conventions.COORDINATES` [m, rad] from the start of right_flat on.
     """

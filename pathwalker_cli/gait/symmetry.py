@@ -60,11 +60,7 @@ def require_symmetry(walker: Walker) -> None:
 
 
 def full_stride(step: PhasedMotion) -> PhasedMotion:
-    """Return the stride whose second half is a step's mirror image.
-
-    Args:
-        step: Motion in the phases of the right step; it ends in its own mirrored beginning.
-    """
+    """Return a step, which ends in its own mirrored beginning, followed by its mirror image."""
     length = walked_distance(step)
     costs = step.phases[-1].integrals[-1] - step.phases[0].integrals[0]
     second = tuple(_mirrored(phase, length, costs) for phase in step.phases)

@@ -26,10 +26,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path that takes the place of `path` when the block ends without an error.
 
     After an error the temporary file is gone and an older file at `path` is untouched; an error of
-    the disk tells `path`.
-
-    Args:
-        path: Where the file shall be; its folder must exist.
+    the disk tells `path`, whose folder must exist.
     """
     target = Path(path)
     temporary = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.tmp")
@@ -46,10 +43,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 
 def check_room(folder: Path) -> None:
-    """Refuse a disk that is full, before the work whose results it would take.
-
-    Args:
-        folder: A folder, which need not exist yet.
+    """Refuse a full disk before the work whose results it would take; the folder may be missing.
 
     Raises:
         DataError: If there is hardly any room.
@@ -68,10 +62,7 @@ def check_room(folder: Path) -> None:
 def sweep(folder: Path, name: str = "", deep: bool = False) -> None:
     """Take away what killed processes had begun to write; nobody may be at work there.
 
-    Args:
-        folder: The folder.
-        name: Name of what was to be written; "" for anything.
-        deep: Whether to look into its folders too.
+    Of one `name` or of any; if `deep`, in its folders too.
     """
     for left in folder.rglob(".*.tmp") if deep else folder.glob(".*.tmp"):
         if _TEMPORARY.fullmatch(left.name) and name in ("", left.name[1:-13]):
@@ -97,9 +88,7 @@ def swapped(one: Path, other: Path) -> bool:
 def atomic_open(path: str | Path, mode: Literal["w", "wb"] = "w") -> Iterator[IO[Any]]:
     """Yield an open file that appears at `path` when the block ends without an error.
 
-    Args:
-        path: Where the file shall be; its folder must exist.
-        mode: "w" for UTF-8 text with line ends as they are written, "wb" for bytes.
+    Text is UTF-8 with line ends as they are written; the folder must exist.
     """
     text = {"encoding": "utf-8", "newline": ""} if mode == "w" else {}
     with atomic_path(path) as temporary, temporary.open(mode, **text) as file:  # type: ignore[call-overload]
@@ -110,10 +99,7 @@ def atomic_open(path: str | Path, mode: Literal["w", "wb"] = "w") -> Iterator[IO
 def staged_folder(target: str | Path) -> Iterator[Path]:
     """Yield an empty folder whose files move into `target` when the block ends without an error.
 
-    After an error nothing is there that was not before.
-
-    Args:
-        target: Where the files shall be; files of the same name are replaced.
+    After an error nothing is there that was not before; else files of the same name are replaced.
 
     Raises:
         DataError: If the target is a file or cannot be written.

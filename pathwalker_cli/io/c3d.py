@@ -56,12 +56,9 @@ class Recording:
     """What one C3D file holds.
 
     Args:
-        name: Name of the trial.
         rate: Marker frames per second [1/s].
         markers: Marker names without the subject's name.
         positions: Marker positions in the laboratory [m], NaN where missing, shape (n, m, 3).
-        events: Foot strikes and toe-offs in order of time.
-        plates: Force plates.
         samples_per_frame: Analog samples per marker frame.
         first_frame: Number that the recording program gives the first frame.
         subjects: Whom the file names before its markers.
@@ -109,11 +106,7 @@ class Recording:
 
 
 def read_c3d(path: str | Path, subject: str | None = None) -> Recording:
-    """Read a recording.
-
-    Args:
-        path: The C3D file.
-        subject: Whose markers to read, if the file names several; all if left out.
+    """Read a recording, with one subject's markers alone if a subject is named.
 
     Raises:
         DataError: If the file is missing, is not C3D, or holds units that are not known.

@@ -56,10 +56,6 @@ def c3d_files(paths: Sequence[str | Path]) -> tuple[Path, ...]:
 def readable_recording(path: Path, subject: str | None = None) -> Recording:
     """Read a recording and check that it is a motion.
 
-    Args:
-        path: The C3D file.
-        subject: Whose markers to read, if the file names several.
-
     Raises:
         DataError: If the file is damaged, or lacks frames.
     """
@@ -75,13 +71,9 @@ def readable_recording(path: Path, subject: str | None = None) -> Recording:
 
 
 def check_markers(recording: Recording, names: Sequence[str], height: float, path: Path) -> None:
-    """Refuse a recording that lacks markers, or whose markers and plates cannot be right.
+    """Refuse a recording that lacks markers, or whose markers or plates cannot be right.
 
-    Args:
-        recording: The recording.
-        names: Names of the markers that are needed.
-        height: Height of the patient [m].
-        path: Its file.
+    The height is that of the patient [m].
 
     Raises:
         DataError: If so.

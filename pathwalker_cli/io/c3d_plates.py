@@ -81,9 +81,7 @@ def centre_of_pressure(load: ForcePlate, least_force: float) -> np.ndarray:
 def read_plates(content: Any, unit: float) -> tuple[tuple[ForcePlate, ...], tuple[str, ...]]:
     """Return the plates that can be read, and a sentence about every other one.
 
-    Args:
-        content: ezc3d's view of the file.
-        unit: Length of the file's unit [m].
+    Content is ezc3d's view of the file; the unit is its unit of length [m].
     """
     group = content["parameters"].get("FORCE_PLATFORM", {})
     used = np.atleast_1d(group["USED"]["value"]) if "USED" in group else np.zeros(1)

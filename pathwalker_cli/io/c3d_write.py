@@ -26,14 +26,7 @@ _SIX_COMPONENTS: Final = 2
 
 
 def write_c3d(path: Path, recording: Recording, unit: str = "mm", description: str = "") -> None:
-    """Write a recording.
-
-    Args:
-        path: The file; an earlier one is replaced.
-        recording: Markers, events and force plates; its name is not written.
-        unit: Unit of lengths in the file: "mm", "cm" or "m".
-        description: What the file holds, for TRIAL:DESCRIPTION.
-    """
+    """Write a recording but for its name, in "mm", "cm" or "m", in the place of an earlier file."""
     import ezc3d
 
     frames, count = recording.positions.shape[:2]

@@ -49,10 +49,6 @@ def read_cells(path: Path, mend: str = "", encoding: str = "utf-8") -> list[list
 def read_rows(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
     """Return the rows of a file by heading without unit.
 
-    Args:
-        path: The file.
-        columns: Headings without unit that it must have.
-
     Raises:
         DataError: If it cannot be read or lacks a column.
     """
@@ -68,11 +64,7 @@ def read_rows(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
 def number(row: Mapping[str, str], column: str, form: str, factor: float = 1.0) -> str:
     """Return a number of a row as people read it, "-" where there is none.
 
-    Args:
-        row: The row.
-        column: Heading without unit.
-        form: Format of the number.
-        factor: From the unit of the file to that of the page.
+    The factor leads from the unit of the file to that of the page.
     """
     try:
         value = factor * float(row.get(column, ""))

@@ -40,10 +40,7 @@ class YamlModel(BaseModel):
 def invalid(what: str, *, allowed: str = "", mend: str = "") -> PydanticCustomError:
     """Return the error that a validator raises so that the user sees these three clauses.
 
-    Args:
-        what: What is wrong, without the key: "is 125 m".
-        allowed: What would be accepted.
-        mend: What to do about it.
+    What is wrong stands without the key: "is 125 m".
     """
     context = {"what": what, "allowed": allowed, "mend": mend}
     return PydanticCustomError("pathwalker", "{what}", context)

@@ -26,10 +26,6 @@ def json_text(content: Mapping[str, Any]) -> str:
 def read_json(path: Path, mend: str = "make it again") -> dict[str, Any]:
     """Return the mapping in a JSON file.
 
-    Args:
-        path: The file.
-        mend: What to do if it cannot be used.
-
     Raises:
         DataError: If it cannot be read or holds something else.
     """

@@ -18,14 +18,9 @@ _NO_LOCKS: Final = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 
 @contextmanager
 def locked(file: Path, where: Path, wait: bool = False) -> Iterator[None]:
-    """Hold a file for this process; it is gone afterwards, as are folders made for it alone.
+    """Hold a file, which stands for `where`; after it the folders made for it alone are gone too.
 
     A process that is killed leaves the file, but no lock.
-
-    Args:
-        file: The file, which stands for `where`; its folder is made if it is not there.
-        where: What is held, for the messages.
-        wait: Whether to wait until nobody else holds it.
 
     Raises:
         DataError: If another process holds it, or it cannot be made.

@@ -21,10 +21,7 @@ from pathwalker_cli.trajectory import Trajectory
 def write_opensim(path: str | Path, table: Trajectory, digits: int = 8) -> None:
     """Write a table as .mot or .sto: SI units and radians, NaN as `nan`.
 
-    Args:
-        path: The file; its stem becomes the table's name.
-        table: What to write; the units are those that OpenSim expects and are not written.
-        digits: Significant digits.
+    The file's stem becomes the table's name; units are not written, OpenSim expects these.
     """
     header = [
         Path(path).stem,
@@ -99,9 +96,7 @@ def plate_table(time: np.ndarray, plates: Sequence[ForcePlate]) -> Trajectory:
 def write_trc(path: str | Path, recording: Recording) -> None:
     """Write the markers that some frame shows as .trc [mm]; where one is not seen, cells are empty.
 
-    Args:
-        path: The file.
-        recording: The markers, x along the walk and z up.
+    The markers have x along the walk and z up.
     """
     seen = np.isfinite(recording.positions[..., 0]).any(axis=0)
     names = [name for name, there in zip(recording.markers, seen, strict=True) if there]

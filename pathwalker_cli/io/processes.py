@@ -103,12 +103,7 @@ def ended_calls(
     A worker that dies takes along the one call in its hands, whose future raises `ProcessExpired`;
     if no worker can begin, all futures raise `BrokenProcessPool`.  If the caller stops, e.g. by
     Ctrl-C, all workers are ended at once.
-
-    Args:
-        call: What is called.
-        calls: Its arguments, a tuple for every call.
-        workers: Most processes.
-        time_limit: Longest time of a call [s], after which its future raises `TimeoutError`.
+    After the time limit [s] a call's future raises `TimeoutError`.
     """
     waiting, running = deque(enumerate(calls)), dict[Future[Result], int]()
     count, context = min(workers, len(calls)), _KeptLocks()

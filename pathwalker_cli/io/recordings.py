@@ -47,7 +47,6 @@ class CompactRecording:
     """One recorded trial.
 
     Args:
-        name: Name of the trial.
         motion: Coordinates in every frame, unfiltered.
         events: Foot strikes and toe-offs; frames count the rows of `motion`.
         forces: Columns force_r_x, force_r_z, cop_r_x and the same on the left, NaN where not

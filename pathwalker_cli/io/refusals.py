@@ -58,16 +58,7 @@ def sentence(
     error: type[InputError],
     lines: Lines,
 ) -> InputError:
-    """Turn pydantic's list of problems into one error; unknown keys come first.
-
-    Args:
-        problem: What pydantic found.
-        mapping: What was validated.
-        model_class: Against what.
-        where: File or origin, for the message.
-        error: Class of the error.
-        lines: Line numbers of the keys.
-    """
+    """Turn pydantic's list of problems into one error; unknown keys come first."""
     problems = sorted(problem.errors(), key=lambda item: item["type"] != "extra_forbidden")
     first: Any = problems[0]
     path = _path_in(mapping, first["loc"])

@@ -8,10 +8,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 def templates(package: str, folder: str = "templates", *, escape: bool = True) -> Environment:
     """Return the templates of a package; undefined names are errors.
 
-    Args:
-        package: Name of the package.
-        folder: Where in it they stand.
-        escape: Whether values are escaped as HTML; False for plain text and YAML only.
+    Values are to be escaped as HTML but in plain text and YAML.
     """
     return Environment(
         loader=PackageLoader(package, folder),

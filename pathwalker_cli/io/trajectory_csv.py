@@ -17,13 +17,7 @@ _HEADER: Final = re.compile(r"^\s*(?P<name>\w+)\s*\[(?P<unit>[^\]]*)\]\s*$")
 
 
 def write_trajectory(path: str | Path, trajectory: Trajectory, digits: int = 6) -> None:
-    """Write a trajectory; values that are NaN become empty cells.
-
-    Args:
-        path: The file.
-        trajectory: What to write.
-        digits: Significant digits.
-    """
+    """Write a trajectory with so many significant digits; where it is NaN, cells are empty."""
     names = zip(trajectory.names, trajectory.units, strict=True)
     header = ["time [s]", *(f"{name} [{unit}]" for name, unit in names)]
     rows = np.column_stack([trajectory.time, trajectory.values])
@@ -31,11 +25,7 @@ def write_trajectory(path: str | Path, trajectory: Trajectory, digits: int = 6) 
 
 
 def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
-    """Read a trajectory.
-
-    Args:
-        path: The file.
-        missing: Whether empty cells are allowed; they become NaN.
+    """Read a trajectory; if `missing`, empty cells are allowed and become NaN.
 
     Raises:
         DataError: If the file cannot be read; the message names row and column.

@@ -51,11 +51,6 @@ def load_yaml(
 ) -> Model:
     """Read a YAML file and validate it.
 
-    Args:
-        path: The file.
-        model_class: Pydantic model of its content.
-        error: Class of the error to raise.
-
     Raises:
         InputError: Of class `error`, if the file cannot be read or its content is refused.
     """
@@ -132,13 +127,6 @@ def validate(
     lines: Lines | None = None,
 ) -> Model:
     """Validate a mapping strictly (no text for numbers, no NaN) into a model.
-
-    Args:
-        mapping: What was read.
-        model_class: Pydantic model of it.
-        where: File or origin, for the message.
-        error: Class of the error to raise.
-        lines: Line numbers of the keys, from `read_mapping`.
 
     Raises:
         InputError: Of class `error`, one sentence about the first thing that is wrong.
@@ -254,10 +242,5 @@ def _not_finite(value: Any, prefix: KeyPath = ()) -> KeyPath:
 
 
 def yaml_text(content: Mapping[str, Any], heading: str) -> str:
-    """Return content as YAML below a comment.
-
-    Args:
-        content: Plain values by key.
-        heading: One line that says what it is.
-    """
+    """Return content as YAML below a comment of one line."""
     return f"# {heading}\n{yaml.safe_dump(content, sort_keys=False, allow_unicode=True)}"

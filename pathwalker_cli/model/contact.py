@@ -35,12 +35,7 @@ Contact = tuple[Use, Use]
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """A place of a foot that may stand on the ground.
-
-    Args:
-        place: Where on the foot.
-        side: Which foot.
-    """
+    """A place of a foot that may stand on the ground."""
 
     place: Literal["heel", "toe", "sole"]
     side: Side
@@ -102,7 +97,6 @@ class ContactPhase:
     """A stretch of gait in which the same contact forces act.
 
     Args:
-        name: Name of the phase.
         forces: Active components; each stands for one direction in which its place does not move.
         step: The side that stands while the other one swings and lands.
     """

@@ -121,11 +121,7 @@ class Unknown:
 
 
 def unknowns_at(addresses: Iterable[str], numbers: Sequence[Number]) -> tuple[Unknown, ...]:
-    """Return the unknowns that stand for these addresses.
-
-    Args:
-        addresses: Addresses; one without side stands for both sides alike.
-        numbers: All numbers of a walker.
+    """Return the unknowns that stand for these addresses; one without side stands for both alike.
 
     Raises:
         ConfigError: If there is no such number, or one is asked for twice.

@@ -90,9 +90,6 @@ class Parts:
         What a device is identified for stands first, per kind right before left, unless both sides
         alike are asked for.
 
-        Args:
-            free: Addresses of numbers that are asked for.
-
         Raises:
             ConfigError: If there is no such number.
         """

@@ -42,11 +42,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Joints in the order of the generalised coordinates, parents before children.
-
-    Args:
-        joints: The joints.
-    """
+    """Joints in the order of the generalised coordinates, parents before children."""
 
     joints: tuple[Joint, ...]
 

@@ -39,7 +39,6 @@ class Walker:
     """A patient's walking model in one condition.
 
     Args:
-        patient: The patient.
         parts: What it is made of.
         skeleton: Bodies and joints; names and order of the coordinates.
         model: Rigid bodies in Pinocchio.

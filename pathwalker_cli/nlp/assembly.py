@@ -117,7 +117,6 @@ class Assembly:
         size: Number of unknowns.
         parameters: Number of parameters.
         rows: Number of rows.
-        parts: The blocks.
     """
 
     size: int
@@ -150,12 +149,7 @@ class Assembly:
 def mapped_functions(
     assembly: Assembly, blocks: Sequence[Mapping[str, ca.Function]]
 ) -> dict[str, ca.Function]:
-    """Return the functions of a program, evaluated by CasADi's virtual machine.
-
-    Args:
-        assembly: The program.
-        blocks: Functions of all kinds by block.
-    """
+    """Return the functions of a program, evaluated by CasADi's virtual machine."""
     symbols = {name: ca.MX.sym(name, size) for name, size in assembly.arguments.items()}
     outputs = {
         kind: [

@@ -73,7 +73,6 @@ class Block:
     """A small function that occurs many times in a nonlinear program.
 
     Args:
-        name: Name for reports.
         build: Returns its expressions; called when somebody asks for what is not kept.
         kept: Number of rows and tapes by kind, where they are known; a block that does not matter
             has none.

@@ -103,9 +103,6 @@ class NlpResult:
         status: "converged" or the reason why not, in words.
         unknowns: Scaled unknowns.
         rows: Scaled values of the rows.
-        objective: Value of the objective.
-        multipliers: Multipliers.
-        iterations: Number of iterations.
         seconds: Wall seconds of the solve.
         seconds_functions: Wall seconds in function evaluations.
     """
@@ -181,16 +178,7 @@ class NlpSolver:
         start: np.ndarray,
         multipliers: Multipliers | None = None,
     ) -> NlpResult:
-        """Minimise a program of the structure.
-
-        Args:
-            program: The program.
-            start: Scaled unknowns to start from.
-            multipliers: Multipliers to start from, for a warm start.
-
-        Returns:
-            The last iterate, converged or not.
-        """
+        """Minimise a program from scaled unknowns; return the last iterate, converged or not."""
         arguments: dict[str, Any] = {"x0": start, "p": program.parameters}
         arguments |= dict(zip(("lbx", "ubx"), program.bounds, strict=True))
         arguments |= dict(zip(("lbg", "ubg"), program.row_bounds, strict=True))

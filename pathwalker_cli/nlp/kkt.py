@@ -86,7 +86,6 @@ class KktSystem:
     """The KKT system of a program at its optimum.
 
     Args:
-        program: The program.
         result: Its solution; the tighter its tolerance, the clearer what is active.
     """
 
@@ -113,11 +112,7 @@ class KktSystem:
         """Number of inequalities that are neither clearly active nor clearly inactive."""
 
     def changed(self, other: KktSystem) -> int:
-        """Return how many inequalities are clearly active in one system and clearly not in other.
-
-        Args:
-            other: The system of a program with the same unknowns and rows.
-        """
+        """Return how many inequalities are clearly active in this system or the other alone."""
         mine, theirs = self._ratios, other._ratios
         gone = (mine > _DOUBTFUL) & (theirs < 1.0 / _DOUBTFUL)
         come = (theirs > _DOUBTFUL) & (mine < 1.0 / _DOUBTFUL)
@@ -126,10 +121,7 @@ class KktSystem:
     def answer(self, below: Program, above: Program, step: float) -> Answer:
         """Return the derivatives by a number of the problem; free parameters follow it.
 
-        Args:
-            below: The same program with the number one step lower.
-            above: The same program with the number one step higher.
-            step: Half the distance between the two.
+        The number is one step lower in the program `below` and one higher in `above`.
         """
         change = self._change(below, above, step)
         answer = self._answer(change)

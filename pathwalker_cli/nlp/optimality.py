@@ -40,10 +40,7 @@ class Optimality:
 def optimality(program: Program, unknowns: np.ndarray, multipliers: Multipliers) -> Optimality:
     """Return how well a point and its multipliers meet the first-order conditions.
 
-    Args:
-        program: The program.
-        unknowns: Scaled unknowns.
-        multipliers: Multipliers, positive at upper bounds.
+    Unknowns are scaled; multipliers are positive at upper bounds.
     """
     functions = program.plain_functions()
     cost, gradient = functions["grad_f"](unknowns, program.parameters)

@@ -114,11 +114,7 @@ class FactorReport:
 
 
 class StageFactors:
-    """LDL^T factors of the systems that IPOPT meets in programs of one structure.
-
-    Args:
-        library: The compiled library.
-    """
+    """LDL^T factors of the systems that IPOPT meets in programs of one structure."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self._library = library

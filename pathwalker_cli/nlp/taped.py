@@ -18,12 +18,7 @@ from pathwalker_cli.nlp.tape import INPUT, LANES, Tape
 def taped_functions(
     assembly: Assembly, tapes: Sequence[Mapping[str, Tape]]
 ) -> Mapping[str, ca.Function]:
-    """Return the functions of a program.  CasADi does not keep them alive: the caller must.
-
-    Args:
-        assembly: The program.
-        tapes: Tapes of all kinds by block.
-    """
+    """Return the functions of a program.  CasADi does not keep them alive: the caller must."""
     runs = {
         kind: _Runs([_run(assembly, i, kind, tape[kind]) for i, tape in enumerate(tapes)])
         for kind in KINDS
@@ -143,7 +138,6 @@ class _TapedFunction(ca.Callback):
     for a result that is not wanted; and `nlpsol` asks for no derivative of what says it has none.
 
     Args:
-        name: Its name.
         arguments: Lengths of the arguments by name; sources are counted in this order.
         results: Patterns of the results by name.
         terms: What is summed: tapes, and which result each of their outputs is added to.

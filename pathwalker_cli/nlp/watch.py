@@ -42,12 +42,7 @@ Observer = Callable[[ProgressReport], bool | None]
 
 
 class Watcher(ca.Callback):
-    """Reports every iteration and ends the solve when asked to.
-
-    Args:
-        program: A program of the structure that is solved.
-        observer: Called after every iteration.
-    """
+    """Reports every iteration and ends the solve when asked to."""
 
     def __init__(self, program: Program, observer: Observer | None) -> None:
         ca.Callback.__init__(self)

@@ -28,8 +28,6 @@ class CollocationProgram(Transcription[PhasePlaces]):
     """A problem with its numbers on one mesh.
 
     Args:
-        blocks: The blocks of the problem.
-        numbers: The numbers of the problem.
         meshes: Node positions of every phase, from 0 to 1.
     """
 

@@ -41,7 +41,6 @@ class CollocationBlocks:
     """The blocks of a problem for one collocation degree; they serve every mesh.
 
     Args:
-        problem: The structure of the problem.
         degree: Number of Radau points in an interval.
         kept: Rows and tapes by name of all blocks that matter, if they are known.
     """

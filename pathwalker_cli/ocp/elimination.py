@@ -25,8 +25,6 @@ class StageKeys:
     side by side.
 
     Args:
-        layout: Places of the unknowns.
-        blocks: The blocks.
         rows: Number of rows.
         rows_of: Returns the rows that a block stands for, shape (rows, occurrences).
     """

@@ -82,7 +82,6 @@ class PlaceBook:
     """Hands out places of unknowns one after the other, those that stand once first.
 
     Args:
-        problem: The problem.
         controls: What stands in the place of its controls.
     """
 

@@ -16,13 +16,7 @@ from pathwalker_cli.ocp.phased import quadrature_weights
 def transferred(
     old: CollocationProgram, multipliers: Multipliers, new: CollocationProgram
 ) -> Multipliers:
-    """Return multipliers on the mesh of another program of the same problem and degree.
-
-    Args:
-        old: The program that was solved.
-        multipliers: Its multipliers.
-        new: The program to be solved.
-    """
+    """Return multipliers on the mesh of another program of the same problem and degree."""
     return Multipliers(
         _of_unknowns(old, multipliers.unknowns, new), _of_rows(old, multipliers.rows, new)
     )

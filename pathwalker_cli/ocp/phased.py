@@ -22,13 +22,7 @@ def quadrature_weights(degree: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def lagrange_weights(nodes: np.ndarray, at: np.ndarray, derivative: bool = False) -> np.ndarray:
-    """Return the matrix that evaluates an interpolating polynomial, shape (len(at), len(nodes)).
-
-    Args:
-        nodes: Interpolation points.
-        at: Where to evaluate.
-        derivative: Whether the derivative is wanted instead of the value.
-    """
+    """Return the matrix that evaluates an interpolating polynomial, shape (len(at), len(nodes))."""
     columns = []
     for i, node in enumerate(nodes):
         others = np.delete(nodes, i)
@@ -42,7 +36,6 @@ class PhaseMotion:
     """One phase on its mesh of N intervals with d collocation points each.
 
     Args:
-        name: Name of the phase.
         duration: Length [s].
         mesh: Node positions in the phase, from 0 to 1, shape (N + 1,).
         states: x at the nodes, shape (N + 1, nx).

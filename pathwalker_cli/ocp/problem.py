@@ -101,7 +101,6 @@ class Phase:
     """One phase of the problem, in the symbols of its `MultiPhaseProblem`.
 
     Args:
-        name: Name for reports.
         algebraic: The algebraic variables z of this phase.
         derivative: f, SX of shape (number of states,).
         residual: r, equality rows that hold at every collocation point.
@@ -157,7 +156,6 @@ class MultiPhaseProblem:
         point_data: Symbols of numbers that differ from instant to instant, SX (m,).
         integrals: Names of the running costs.
         integral_scale: What counts as 1 for each running cost.
-        phases: The phases in order.
         node_rows: Rows in y and u that hold at every mesh node.
         boundary: Boundary rows and objective.
         sample: Term of the objective at every instant of `ProblemNumbers.samples`, scalar SX in

@@ -26,8 +26,6 @@ class ShootingProgram(Transcription[ShootingPlaces]):
     Steps of unequal number do not make groups of one size: IPOPT's own solver finds an order.
 
     Args:
-        blocks: The blocks of the problem.
-        numbers: The numbers of the problem.
         meshes: Node positions of every phase, from 0 to 1.
         edges: Ends of the steps in every interval, from 0 to 1, by phase and interval.
         rounding: How far kinks of the smooth states' equation are rounded off.

@@ -82,11 +82,7 @@ class PhaseBlocks:
 
 
 class ShootingBlocks:
-    """The blocks of a shooting problem; they serve every mesh and every choice of steps.
-
-    Args:
-        shooting: The problem.
-    """
+    """The blocks of a shooting problem; they serve every mesh and every choice of steps."""
 
     def __init__(self, shooting: ShootingProblem) -> None:
         self.shooting = shooting

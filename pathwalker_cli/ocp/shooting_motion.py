@@ -50,11 +50,6 @@ class Shooter:
     """Integrates the intervals of a shooting problem, each from its first node.
 
     Time runs from 0 to 1 in every interval; the state X is (x, y, running costs since the node).
-
-    Args:
-        blocks: The blocks of the problem.
-        numbers: The numbers of the problem.
-        nodes: Values at the nodes.
     """
 
     def __init__(
@@ -125,12 +120,7 @@ class Shooter:
                 yield i, n, self.steps(i, n, ends)
 
     def motion(self, edges: Edges, degree: int = 3) -> PhasedMotion:
-        """Return the motion on a mesh of all steps, in the form of a collocated one.
-
-        Args:
-            edges: Ends of the steps.
-            degree: Number of Radau points in every step at which states are wanted.
-        """
+        """Return the motion on a mesh of all steps, with Radau points in each, as if collocated."""
         costs = np.zeros(self._costs)
         phases = []
         for i, intervals in enumerate(edges):

@@ -40,10 +40,6 @@ def boundary_expressions(problem: MultiPhaseProblem, controls: Variables) -> Exp
     """Return boundary rows and objective.
 
     Unknowns T of all phases, p, first x, y, controls, last x, y, controls, running costs.
-
-    Args:
-        problem: The problem.
-        controls: What stands in the place of its controls.
     """
     b, groups = problem.boundary, (problem.states, problem.smooth, controls)
     p = Unknown.of(problem.parameters, "p")
@@ -64,10 +60,7 @@ class Transcription(BlockProgram, Generic[P]):
     """A problem with its numbers on a mesh as a nonlinear program; satisfies `nlp.program.Program`.
 
     Args:
-        problem: The problem.
-        numbers: Its numbers.
         meshes: Node positions of every phase, from 0 to 1.
-        layout: Places of the unknowns.
     """
 
     def __init__(

@@ -98,11 +98,7 @@ def generalised_forces(
 ) -> list[Any]:
     """Return the sum of the forces on every coordinate: the only such sum there is.
 
-    Args:
-        elements: The elements.
-        forces: What `element_forces` returns for them.
-        coordinates: All generalised coordinates in order.
-        zero: What stands where nothing acts.
+    Forces are those that `element_forces` returns; `zero` stands where nothing acts.
     """
     sums: dict[str, Any] = {}
     acted_on = (name for element in elements for name in element.coordinates)

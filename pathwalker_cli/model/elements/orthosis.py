@@ -145,11 +145,7 @@ then the fields of `OrthosisSide`."""
 
 @dataclass(frozen=True)
 class AnkleOrthosis:
-    """The orthosis of one side as a force element.
-
-    Args:
-        side: "right" or "left".
-    """
+    """The orthosis of one side as a force element."""
 
     side: Side
 

@@ -74,11 +74,7 @@ SHARED: Final = (
 
 @dataclass(frozen=True)
 class LegTissue:
-    """The passive torques of one leg as a force element.
-
-    Args:
-        side: "right" or "left".
-    """
+    """The passive torques of one leg as a force element."""
 
     side: Side
 
