@@ -75,12 +75,8 @@ def _keys_of(allowed: Collection[str], elsewhere: Collection[str] = ()) -> After
 RangeByAngle = Annotated[dict[str, Range], _keys_of(ANGLES)]
 
 
-def _as_text(value: Any) -> Any:
-    """Let names of trials that look like numbers be names."""
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
-
-
-TrialName = Annotated[str, BeforeValidator(_as_text)]
+# names of trials that look like numbers are names
+TrialName = Annotated[str, BeforeValidator(lambda x: str(x) if type(x) is int else x)]
 
 
 class ModelConfig(YamlModel):

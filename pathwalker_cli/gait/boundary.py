@@ -49,7 +49,8 @@ def gait_boundary(
     if start is None:
         ends = _periodicity(groups, first, last, mirrored)
     else:
-        ends = [_at_first(start, groups[0], first[0])]
+        (value,) = ca.substitute([start.value], [groups[0].symbol], [first[0]])
+        ends = [replace(start, value=value)]
     rows = Rows.join(*ends, *([_symmetry(parameters)] if mirrored else []), free)
     total = dict(zip(costs.integrals, ca.vertsplit(steps * totals), strict=True))
     totals_by_name = Totals(total, distance, time, ca.vertsplit(durations), phases)
@@ -71,12 +72,6 @@ def _symmetry(parameters: Variables) -> Rows:
     difference = ca.vertcat(*(p[i] - p[k] for i, k in pairs))
     scale = np.array([parameters.scale[i] for i, _ in pairs])
     return Rows.make(difference, tuple(f"{names[i]} symmetry" for i, _ in pairs), scale)
-
-
-def _at_first(rows: Rows, states: Variables, first: ca.SX) -> Rows:
-    """Return rows in the states as rows in the states of the first instant."""
-    (value,) = ca.substitute([rows.value], [states.symbol], [first])
-    return replace(rows, value=value)
 
 
 def _periodicity(groups: Groups, first: Instant, last: Instant, mirrored: bool) -> list[Rows]:

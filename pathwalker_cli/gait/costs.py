@@ -69,11 +69,6 @@ class Instant:
         return tuple(sorted(SUFFIX[side] for side in self.phase.feet))
 
     @property
-    def first_step(self) -> bool:
-        """Whether the phase belongs to the first half of the stride."""
-        return self.phase.step == SIDES[0]
-
-    @property
     def vertical_force(self) -> dict[str, Any]:
         """Vertical force by contact point, 0 for points in the air [N]."""
         loads = {f.point.name: self.force[i] for i, f in enumerate(self.phase.forces) if f.bears}
@@ -206,7 +201,7 @@ def _crouch(point: Instant) -> tuple[Any, ...]:
 
 def _asymmetry(point: Instant) -> tuple[Any, ...]:
     speed = point.v[COORDINATES.index("pelvis_tx")]
-    advance = speed if point.first_step else 0.0 * speed
+    advance = speed if point.phase.step == SIDES[0] else 0.0 * speed
     return advance, *(point.angle(f"{j}_r") - point.angle(f"{j}_l") for j in LEG_JOINTS)
 
 

@@ -108,9 +108,5 @@ def _times(group: Mapping[str, Any], count: int) -> np.ndarray:
 
 def _first(patterns: Iterable[tuple[str, Any]], texts: Iterable[str]) -> Any:
     """Return what the first pattern found in the texts stands for, None without any."""
-    for text in texts:
-        words = text.strip().lower().replace("_", " ")
-        for pattern, meaning in patterns:
-            if re.search(pattern, words):
-                return meaning
-    return None
+    words = (text.strip().lower().replace("_", " ") for text in texts)
+    return next((meaning for w in words for p, meaning in patterns if re.search(p, w)), None)

@@ -157,8 +157,4 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
     """Return the first pydantic model inside an annotation such as `dict[str, X] | None`."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    for argument in getattr(annotation, "__args__", ()):
-        model = _model_in(argument)
-        if model is not None:
-            return model
-    return None
+    return next(filter(None, map(_model_in, getattr(annotation, "__args__", ()))), None)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.choices import ROCKER_SHARES, ROUNDNESS
 from pathwalker_cli.model.numbers import Number
 from pathwalker_cli.model.skeleton import SIDES, SUFFIX, Side
-
-if TYPE_CHECKING:
-    from pathwalker_cli.patient import Patient
 
 Feet = Literal["points", "rockers", "sole"]
 """What feet touch the ground with: heel and toe as points, the same as circles that roll without
@@ -59,12 +56,10 @@ class ContactPoint:
                 self.side, ROUNDNESS, "see model.choices",
             )  # fmt: skip
 
-        def by_length(patient: Patient) -> float:
-            return ROCKER_SHARES[self.place] * patient.length("foot", self.side)
-
         return Number(
             f"rocker_radius.{self.place}.{self.side}", f"{self.place}_radius",
-            f"radius of the {self.place} rocker", "m", self.side, by_length,
+            f"radius of the {self.place} rocker", "m", self.side,
+            lambda patient: ROCKER_SHARES[self.place] * patient.length("foot", self.side),
             "share of the length of the foot, see model.choices",
         )  # fmt: skip
 

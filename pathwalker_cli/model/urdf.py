@@ -46,7 +46,7 @@ def urdf_text(
         f"     Written by PathWalker from the patient {patient.id}; change that, not this. -->",
         f'<robot name="{patient.id}-{condition}">',
         '  <link name="world"/>',
-        *_root(),
+        *(line for joint in PLANAR_WALKER.joints if joint.root for line in _hung(joint)),
     ]
     for part in segments(patient, condition, published, values):
         lines += _link(part)
@@ -104,13 +104,8 @@ def _joint(name: str, parent: str, child: str, origin: Vector) -> list[str]:
     return [*lines, "  </joint>"]
 
 
-def _root() -> list[str]:
-    """Return the three joints between world and pelvis with the empty links between them."""
-    return [line for joint in PLANAR_WALKER.joints if joint.root for line in _hung(joint)]
-
-
 def _hung(joint: Joint) -> list[str]:
-    """Return a joint of the root; the pelvis itself is written with the segments."""
+    """Return a joint of the root and its empty link; the pelvis is written with the segments."""
     return [
         *([f'  <link name="{joint.child}"/>'] if joint.slides else []),
         f'  <joint name="{joint.coordinate}" type="{"prismatic" if joint.slides else "revolute"}">',

@@ -133,10 +133,9 @@ class KktSystem:
         """Derivatives by every free parameter (scaled), the others held."""
         n, m = len(self.result.unknowns), len(self.result.rows)
         answers = []
-        for place in self.free:
+        for place, gradient in zip(self.free, self.parameter_gradient.tolist(), strict=True):
             bounds = np.zeros(n)
             bounds[place] = 1.0
-            gradient = float(self._gradient[place])
             answers.append(self._answer(_Change(gradient, np.zeros(n), np.zeros(m), bounds)))
         return tuple(answers)
 
@@ -157,8 +156,8 @@ class KktSystem:
         """Return the second derivative of the cost in one free parameter while others follow."""
         others = self._others(which)
         coupling = self.parameter_hessian[others, which]
-        follow = self._follow(coupling, others)
-        return float(self.parameter_hessian[which, which] + coupling @ follow)
+        own = self.parameter_hessian[which, which]
+        return float(own + coupling @ self._follow(coupling, others))
 
     def _others(self, which: int) -> list[int]:
         return [i for i in range(len(self.free)) if i != which]
@@ -177,12 +176,7 @@ class KktSystem:
     @cached_property
     def parameter_gradient(self) -> np.ndarray:
         """First derivatives of the optimal cost in the free parameters (scaled)."""
-        return np.asarray(self._gradient[self.free])
-
-    @cached_property
-    def _gradient(self) -> np.ndarray:
-        """Gradient of the Lagrangian without the bounds on the unknowns, shape (n,)."""
-        return self._own_first_order[1]
+        return np.asarray(self._own_first_order[1][self.free])
 
     @cached_property
     def _own_first_order(self) -> tuple[float, np.ndarray, np.ndarray]:

@@ -54,11 +54,6 @@ class Elimination:
     order: np.ndarray
     ends: np.ndarray
 
-    def equals(self, other: Elimination) -> bool:
-        """Return whether order and groups are the same."""
-        mine, theirs = (self.order, self.ends), (other.order, other.ends)
-        return all(map(np.array_equal, mine, theirs))
-
 
 def in_order_of(keys: np.ndarray) -> Elimination:
     """Return the order of unknowns with these keys of group and place within it, shape (n, 2)."""
@@ -154,8 +149,8 @@ class StageFactors:
         return FactorReport(*figures.tolist())
 
     def _order(self, elimination: Elimination) -> None:
-        if not self._elimination.equals(elimination):
-            order, ends = elimination.order, elimination.ends
+        order, ends, known = elimination.order, elimination.ends, self._elimination
+        if not (np.array_equal(known.order, order) and np.array_equal(known.ends, ends)):
             solver = self._library.stage_ldl_new(len(order), order, len(ends), ends)
             self._solver, self._elimination = ctypes.c_void_p(solver), elimination
             self._free()

@@ -21,12 +21,6 @@ from pathwalker_cli.ocp.problem import MultiPhaseProblem, Phase
 from pathwalker_cli.ocp.transcription import Unknown, boundary_expressions
 
 
-def _differentiation(degree: int) -> np.ndarray:
-    """Return the matrix from start and points of an interval to rates at the points."""
-    times = collocation_times(degree)
-    return lagrange_weights(np.concatenate([[0.0], times]), times, derivative=True)
-
-
 @dataclass(frozen=True)
 class _PhaseBlocks:
     """The blocks of one phase: rows at a point, within an interval, at the last instant."""
@@ -106,8 +100,9 @@ class CollocationBlocks:
         Unknowns T, p, x0, (x_k, z_k) for all points, y0, u0, s0, y1, u1, s1.
         """
         problem, d = self.problem, self.degree
-        differentiation = _differentiation(d)
         times, weights = quadrature_weights(d)
+        nodes = np.concatenate([[0.0], collocation_times(d)])
+        differentiation = lagrange_weights(nodes, nodes[1:], derivative=True)
         duration, fraction = ca.SX.sym("T"), ca.SX.sym("fraction")
         step = duration * fraction
         p, x0, _ = self._unknowns(phase, "0")

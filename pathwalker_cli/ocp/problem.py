@@ -216,10 +216,8 @@ class BoundTable:
     def find(self, name: str, phase: str = "", at_end: bool = False) -> tuple[float, float] | None:
         """Return the bounds of a quantity, or None where the table has none."""
         keys: list[tuple[str, ...]] = [(name, phase, "end")] if at_end else []
-        for key in [*keys, (name, phase), (name,)]:
-            if key in self.entries:
-                return self.entries[key]
-        return None
+        keys += [(name, phase), (name,)]
+        return next((self.entries[key] for key in keys if key in self.entries), None)
 
     def arrays(
         self, names: tuple[str, ...], phase: str = "", at_end: bool = False
@@ -229,14 +227,11 @@ class BoundTable:
         lower, upper = np.array(pairs, float).reshape(-1, 2).T
         return lower, upper
 
-    def of_rows(
-        self, rows: Rows, phase: str = "", at_end: bool = False
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def of_rows(self, rows: Rows, phase: str = "") -> tuple[np.ndarray, np.ndarray]:
         """Return scaled bounds of rows: their own, or the entry where there is one."""
         lower, upper = rows.lower.copy(), rows.upper.copy()
         for i, name in enumerate(rows.names):
-            found = self.find(name, phase, at_end)
-            if found is not None:
+            if (found := self.find(name, phase)) is not None:
                 lower[i], upper[i] = found
         return lower / rows.scale, upper / rows.scale
 

@@ -7,7 +7,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 
@@ -171,24 +171,22 @@ class AnkleOrthosis:
 
     def fixed(self, numbers: Mapping[str, Any]) -> OrthosisSide:
         """Return all but the springs, from numbers by address."""
-        values = self._by_name(numbers)
-        return OrthosisSide(**{field.name: values[field.name] for field in fields(OrthosisSide)})
+        return OrthosisSide(*self._values(numbers)[2:])
 
     def springs(self, numbers: Mapping[str, Any]) -> tuple[Any, Any]:
         """Return K_D and K_P [N m/rad], from numbers by address."""
-        values = self._by_name(numbers)
-        return values["dorsiflexion_stiffness"], values["plantarflexion_stiffness"]
+        k_d, k_p = self._values(numbers)[:2]
+        return k_d, k_p
 
-    def _by_name(self, numbers: Mapping[str, Any]) -> dict[str, Any]:
-        return {number.name: numbers[number.address] for number in self.numbers}
+    def _values(self, numbers: Mapping[str, Any]) -> list[Any]:
+        return [numbers[number.address] for number in self.numbers]
 
     def forces(
         self, state: State, numbers: Mapping[str, Any], curve: Curve = plain
     ) -> tuple[Any, ...]:
         """Return the torque on the ankle [N m]; see `ForceElement.forces`."""
         (ankle,) = self.coordinates
-        values = [numbers[number.address] for number in self.numbers]
-        return (curve(_torque, state.q[ankle], *values),)
+        return (curve(_torque, state.q[ankle], *self._values(numbers)),)
 
 
 def _torque(angle: Any, k_d: Any, k_p: Any, *fixed: Any) -> Any:

@@ -48,21 +48,6 @@ def _size(patient: Patient) -> float:
     return patient.body_mass * patient.height / _ADULT
 
 
-def _numbers(side: Side) -> dict[str, Number]:
-    """Return the numbers of one side by their names."""
-    own = "unshifted curves, typical children"
-    numbers = [
-        Number(f"examination.{name}.{side}", name, label, "deg", side, usual, own)
-        for name, (usual, label) in _EXAMINATION.items()
-    ]
-    numbers += [
-        Number(f"tissue.{joint}_stiffness.{side}", f"passive_{joint}_stiffness",
-               f"passive stiffness of the {joint}", "1", side, 1.0, "as size says")
-        for joint in _JOINTS
-    ]  # fmt: skip
-    return {number.name: number for number in numbers}
-
-
 SHARED: Final = (
     Number("tissue.size", "passive_size", "passive torques beside adults'", "1", None, _size,
            "body mass times height, Riener and Edrich (1999)"),
@@ -90,7 +75,18 @@ class LegTissue:
 
     @cached_property
     def _own(self) -> dict[str, Number]:
-        return _numbers(self.side)
+        """The numbers of the side by their names."""
+        side, own = self.side, "unshifted curves, typical children"
+        numbers = [
+            Number(f"examination.{name}.{side}", name, label, "deg", side, usual, own)
+            for name, (usual, label) in _EXAMINATION.items()
+        ]
+        numbers += [
+            Number(f"tissue.{joint}_stiffness.{side}", f"passive_{joint}_stiffness",
+                   f"passive stiffness of the {joint}", "1", side, 1.0, "as size says")
+            for joint in _JOINTS
+        ]  # fmt: skip
+        return {number.name: number for number in numbers}
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
