@@ -106,11 +106,7 @@ class Learnt(YamlModel):
         return {place: number.learnt for place, number in self.numbers.items()}
 
     def at(self, deviations: np.ndarray) -> dict[str, float]:
-        """Return values so far from the learnt ones [prior standard deviations], within ranges.
-
-        Args:
-            deviations: Shape (n,), in the order of the numbers.
-        """
+        """Return values (n,) prior standard deviations from the learnt ones, within ranges."""
         values = {}
         for (place, number), step in zip(self.numbers.items(), deviations, strict=True):
             value = number.value(number.deviations(number.learnt) + float(step))

@@ -97,10 +97,7 @@ def tracking_bounds(
 ) -> BoundTable:
     """Return the bounds of the first stage: given durations and parameters, free reserves.
 
-    Args:
-        bounds: Bounds of the prediction.
-        durations: Phase durations by name [s].
-        held: Value of every unknown of the walker by name [SI].
+    Durations [s] are given by phase, the values that are held [SI] by unknown.
     """
     changes = _each((*RESERVES, "walking_speed"), ANYTHING)
     changes |= _each(ANGLES, choices.TRACKING_ANGLES)
@@ -118,14 +115,10 @@ def helped_bounds(bounds: GaitBounds) -> BoundTable:
 
 
 def held(config: StudyConfig, values: Mapping[Unknown, float]) -> dict[str, Any]:
-    """Return config values by dotted key with which unknowns are held.
+    """Return config values by dotted key with which unknowns are held at values [their units].
 
     What the config frees by its place is held there, springs by their own key: the structure of
     the problem stays, so that neighbours start warm.
-
-    Args:
-        config: The config of the problem.
-        values: Value of every unknown to hold [its unit].
     """
     free: dict[str, Any] = dict(config.free)
     springs: dict[str, Any] = dict(config.bounds.stiffness)

@@ -413,10 +413,7 @@ class Costs:
     ) -> list[Any]:
         """Return the running costs at an instant, whose power and data are filled in here.
 
-        Args:
-            point: The instant.
-            numbers: What `numbers` returns, or symbols for it.
-            terms: The terms, if not all.
+        Numbers are what `numbers` returns, or symbols for it.
         """
         values: list[Any] = []
         at = 0

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from pathwalker_cli.conventions import COORDINATES, GENERATORS
 from pathwalker_cli.gait import choices
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_times
+from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_points
 from pathwalker_cli.trajectory import Trajectory
 
 
@@ -52,12 +52,7 @@ class ReferenceStride:
     ) -> PhasedMotion:
         """Return a start on a mesh: this stride, level activations, weight on the feet.
 
-        Args:
-            walker: Who walks.
-            parameters: Start of the walker's unknowns, shape (k,).
-            meshes: Node positions of every phase.
-            degree: Number of collocation points in an interval.
-            integrals: Number of running costs.
+        Parameters are those of the walker's unknowns, shape (k,).
         """
         rest = degree, integrals
         phases = tuple(self._phase(walker, i, mesh, *rest) for i, mesh in enumerate(meshes))
@@ -67,7 +62,6 @@ class ReferenceStride:
         self, walker: Walker, i: int, mesh: np.ndarray, degree: int, integrals: int
     ) -> PhaseMotion:
         contact, count, weight = walker.pattern.phases[i], len(mesh), walker.weight
-        points = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation_times(degree)
         bearing = [force.bears for force in contact.forces]
         still = np.zeros(len(COORDINATES))  # accelerations before the forces, reserves behind them
         algebraic = [still, np.where(bearing, weight / sum(bearing), 0.0), still]
@@ -83,6 +77,6 @@ class ReferenceStride:
             smooth=np.full((count, len(GENERATORS)), choices.START_ACTIVATION),
             controls=np.zeros((count, len(GENERATORS))),
             integrals=np.zeros((count, integrals)),
-            inner_states=states(points),
+            inner_states=states(collocation_points(mesh, degree)),
             algebraic=np.tile(np.concatenate(algebraic), (count - 1, degree, 1)),
         )

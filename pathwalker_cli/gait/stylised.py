@@ -164,11 +164,7 @@ def _foot_path(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return ankle positions (n, 2) [m] and foot pitch (n,) [rad] of a right foot.
 
-    Args:
-        leg: The leg.
-        gait: Shape of the gait.
-        time: Instants [s]; the foot stands flat at 0.
-        plant: Position of the ankle while it stands flat [m].
+    It stands flat at time 0 [s], its ankle at `plant` [m].
     """
     stride, t = gait.stride_time, np.concatenate([[0.0], np.cumsum(gait.durations)])
     strides, local = np.divmod(time, stride)

@@ -61,12 +61,7 @@ def read_events(
 
     An event between two frames counts for the later one: in the shipped recordings the plates'
     forces rise and fall within one frame of the events read this way.
-
-    Args:
-        group: The file's group EVENT.
-        rate: Frames per second [1/s].
-        first_frame: Number of the first frame that was kept, from 1.
-        frames: Frames of the recording.
+    The rate is in 1/s; `first_frame`, from 1, is the first one that was kept.
     """
     labels = [str(label) for label in continued(group, "LABELS")]
     contexts = [str(side) for side in continued(group, "CONTEXTS")]

@@ -29,10 +29,7 @@ def as_text(value: float | None, digits: int = 6) -> str:
 def read_cells(path: Path, mend: str = "", encoding: str = "utf-8") -> list[list[str]]:
     """Return the rows of a file, its header among them.
 
-    Args:
-        path: The file.
-        mend: What to do if it cannot be read.
-        encoding: "utf-8-sig" where a byte order mark may stand before the header.
+    With "utf-8-sig" a byte order mark may stand before the header.
 
     Raises:
         DataError: If it cannot be read.

@@ -73,11 +73,8 @@ def plate_table(time: np.ndarray, plates: Sequence[ForcePlate]) -> Trajectory:
 
     Of each plate the force `plate_1_vx`, the point where it acts on the surface `plate_1_px` and
     the moment about the vertical through there `plate_1_torque_y`, with their y and z; a plate
-    without load acts at the middle of its surface.
-
-    Args:
-        time: Time of the frames [s], shape (n,).
-        plates: The plates, x along the walk and z up, with a load a frame.
+    without load acts at the middle of its surface.  Time [s] is of shape (n,).
+    The plates have x along the walk and z up, and a load a frame.
     """
     names: list[str] = []
     columns: list[np.ndarray] = []

@@ -34,11 +34,7 @@ def urdf_text(
 ) -> str:
     """Return the walker as URDF text; the same input always gives the same bytes.
 
-    Args:
-        patient: The patient.
-        condition: "barefoot" or "orthosis".
-        published: Reproduce the published model's misplaced right lower arm and hand.
-        values: Masses of the device by address [kg], if not those of the patient's file.
+    Arguments are those of `anthropometry.segments`.
     """
     lines = [
         '<?xml version="1.0"?>',

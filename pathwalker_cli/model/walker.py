@@ -317,10 +317,7 @@ class Walker:
         return solution[:, :n], forces
 
     def contact_points(self, q: Any) -> np.ndarray:
-        """Return where the places of `pattern.points` touch the ground, or would.
-
-        Args:
-            q: Generalised coordinates [m, rad], shape (10,).
+        """Return where the places of `pattern.points` touch the ground in q (10,), or would.
 
         Returns:
             Forward and up [m], shape (k, 2): right heel, right toe, left heel, left toe; of soles
@@ -330,11 +327,7 @@ class Walker:
         return np.asarray(body.point_positions(q, body.parameters)).reshape(-1, 2)
 
     def foot_points(self, q: Any) -> np.ndarray:
-        """Return right heel, right toe, left heel, left toe: forward and up [m], shape (4, 2).
-
-        Args:
-            q: Generalised coordinates [m, rad], shape (10,).
-        """
+        """Return right heel, right toe, left heel, left toe of q (10,): forward, up [m], (4, 2)."""
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, _vector(q, self.skeleton.size, "q"))
         frames = [self.model.getFrameId(point.name) for point in POINTS]

@@ -138,13 +138,7 @@ _REASONS: Final = {
 
 
 class NlpSolver:
-    """IPOPT for programs of one structure: built once, called with many numbers and starts.
-
-    Args:
-        program: A program of the structure.
-        settings: Settings of all solves.
-        observer: Called after every iteration.
-    """
+    """IPOPT for programs of one structure: built once, called with many numbers and starts."""
 
     def __init__(
         self,

@@ -209,11 +209,7 @@ class Columns:
         self._prepared: dict[int, _Runs] = {}
 
     def __call__(self, *points: np.ndarray) -> list[np.ndarray]:
-        """Return the outputs at m points, shape (rows, columns * m) each.
-
-        Args:
-            points: Inputs, shape (n, m) each.
-        """
+        """Return the outputs at m points (n, m), shape (rows, columns * m) each."""
         count = points[0].shape[1]
         if self._tape is None:
             return [np.asarray(output) for output in self._function.call(list(points))]

@@ -10,7 +10,7 @@ import numpy as np
 
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.phased import quadrature_weights
+from pathwalker_cli.ocp.phased import collocation_points, quadrature_weights
 
 
 def transferred(
@@ -89,5 +89,5 @@ def _weights(
     """Return (times, weights) of the nodes and of the collocation points of a phase."""
     steps = np.diff(mesh)
     around = np.concatenate([[steps[0]], (steps[:-1] + steps[1:]), [steps[-1]]]) / 2
-    times, weights = quadrature_weights(degree)
-    return (mesh, around), (mesh[:-1, None] + steps[:, None] * times, steps[:, None] * weights)
+    _, weights = quadrature_weights(degree)
+    return (mesh, around), (collocation_points(mesh, degree), steps[:, None] * weights)

@@ -21,6 +21,11 @@ def quadrature_weights(degree: int) -> tuple[np.ndarray, np.ndarray]:
     return times, np.linalg.solve(moments, 1 / np.arange(1, degree + 1))
 
 
+def collocation_points(mesh: np.ndarray, degree: int) -> np.ndarray:
+    """Return the positions of the Radau points of all N intervals of a mesh, shape (N, degree)."""
+    return np.asarray(mesh[:-1, None] + np.diff(mesh)[:, None] * collocation_times(degree))
+
+
 def lagrange_weights(nodes: np.ndarray, at: np.ndarray, derivative: bool = False) -> np.ndarray:
     """Return the matrix that evaluates an interpolating polynomial, shape (len(at), len(nodes))."""
     columns = []
@@ -69,8 +74,7 @@ class PhaseMotion:
     @property
     def point_fractions(self) -> np.ndarray:
         """Positions of the collocation points in the phase, shape (N, d)."""
-        steps = np.diff(self.mesh)[:, None]
-        return np.asarray(self.mesh[:-1, None] + steps * collocation_times(self.degree))
+        return collocation_points(self.mesh, self.degree)
 
     def locate(self, fractions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return interval numbers and local positions in [0, 1] of fractions of the phase."""
@@ -111,7 +115,7 @@ class PhaseMotion:
 
     def resampled(self, mesh: np.ndarray, degree: int) -> PhaseMotion:
         """Return the same motion on another mesh."""
-        points = (mesh[:-1, None] + np.diff(mesh)[:, None] * collocation_times(degree)).ravel()
+        points = collocation_points(mesh, degree).ravel()
         shape = (len(mesh) - 1, degree, -1)
         interval, local = self.locate(mesh)
         integrals = (

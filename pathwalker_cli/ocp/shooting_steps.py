@@ -139,14 +139,9 @@ def fixed_steps(
 def adaptive_steps(
     slope: Slope, start: np.ndarray, span: tuple[float, float], scale: np.ndarray, tolerance: float
 ) -> tuple[Step, ...]:
-    """Return steps whose error estimates are below a tolerance.
+    """Return steps whose error estimates are below a tolerance, in units of the scales.
 
-    Args:
-        slope: Right-hand side.
-        start: State at the beginning, shape (n,).
-        span: Beginning and end.
-        scale: What counts as 1 in the error estimate, shape (n,); inf where it does not count.
-        tolerance: Largest error estimate of a step, in units of the scales.
+    Other arguments are those of `fixed_steps`.
 
     Raises:
         NotConvergedError: If the steps become too many.

@@ -80,11 +80,6 @@ class Topology:
     def of(cls, model: pin.Model, points: Sequence[str], soles: bool = False) -> Topology:
         """Read the topology of a model.
 
-        Args:
-            model: Model whose joints are all of `JOINT_TYPES`.
-            points: Names of frames of the model.
-            soles: Whether the points of one body are the ends of a sole.
-
         Raises:
             BackendError: A joint is of another type, a point is no frame of the model, or the
                 model has rotor inertia.
@@ -243,11 +238,7 @@ def parameters_of(
 ) -> np.ndarray:
     """Return the named parameters of a model, shape (len(names),), read-only.
 
-    Args:
-        model: Model of the topology the names were made for.
-        topology: Topology of the model.
-        names: Names of parameters, see `RigidBodyFunctions.parameter_names`.
-        shapes: Radii and roundnesses, see `all_parameters`.
+    Names are of `RigidBodyFunctions.parameter_names`, shapes as for `all_parameters`.
 
     Raises:
         BackendError: A name does not exist, or a parameter that is not named is not zero: the

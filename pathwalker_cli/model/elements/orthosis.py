@@ -117,11 +117,7 @@ def _preload_rise(play: Any, preload: Any, stiffness: Any) -> tuple[Any, Any]:
 def orthosis_torque(side: OrthosisSide, angle: Any, k_d: Any, k_p: Any) -> Any:
     """Return the torque of the orthosis on the ankle [N m], restoring.
 
-    Args:
-        side: Fixed parameters.
-        angle: Ankle angle [rad], + plantarflexion; NumPy array or CasADi expression.
-        k_d: Dorsiflexion stiffness K_D [N m/rad].
-        k_p: Plantarflexion stiffness K_P [N m/rad].
+    The angle is + in plantarflexion [rad]; for k_d and k_p see `orthosis_curve`.
     """
     return -evaluate(orthosis_curve(side, k_d, k_p), angle).value
 

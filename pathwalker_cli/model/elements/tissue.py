@@ -164,11 +164,7 @@ def passive_series(
 ) -> dict[str, np.ndarray]:
     """Return the passive torques of a patient's legs at m instants [N m], by coordinate.
 
-    Args:
-        patient: The patient.
-        names: Names of the coordinates.
-        q: Generalised coordinates [m, rad], shape (m, len(names)).
-        v: Generalised velocities [m/s, rad/s], likewise.
+    Coordinates q [m, rad] and velocities v [m/s, rad/s] are of shape (m, len(names)).
     """
     angles, speeds = (dict(zip(names, x.T, strict=True)) for x in (q, v))
     state = State(angles, speeds, {})
