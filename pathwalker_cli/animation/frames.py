@@ -14,12 +14,7 @@ from pathwalker_cli.animation.recorded import RecordedFrames, recorded_frames
 from pathwalker_cli.conventions import SIDES, Condition, Side
 from pathwalker_cli.evaluation.run import run_names, run_notes, stride_of_run
 from pathwalker_cli.stride.series import GaitSeries
-from pathwalker_cli.stride.stride import (
-    body_points,
-    centre_of_pressure,
-    stride_of,
-    switching_times,
-)
+from pathwalker_cli.stride.stride import body_points, centre_of_pressure, stride_of, switching_times
 
 _CLOSED: Final = 1e-3
 """Difference between beginning and end of a stride [m, rad] below which it repeats itself."""

@@ -15,12 +15,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side
-from pathwalker_cli.evaluation.recorded import (
-    RecordedGait,
-    Spread,
-    left_toe_off_stride,
-    spread,
-)
+from pathwalker_cli.evaluation.recorded import RecordedGait, Spread, left_toe_off_stride, spread
 from pathwalker_cli.stride.measure import CYCLE, FORCE, TRIAL, Measure
 from pathwalker_cli.stride.stride import POINTS, Part, Stride
 

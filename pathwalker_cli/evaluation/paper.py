@@ -251,14 +251,7 @@ def _results() -> Iterator[PaperNumber]:
                       "of body weight, in earlier predictions")  # fmt: skip
 
 
-NUMBERS: Final = (
-    *_table_1(),
-    *_table_3(),
-    *_table_4(),
-    *_table_5(),
-    *_differences(),
-    *_results(),
-)
+NUMBERS: Final = (*_table_1(), *_table_3(), *_table_4(), *_table_5(), *_differences(), *_results())
 """Tables 1, 3, 4 and 5 and every number of the results section."""
 
 CLAIMS: Final = (

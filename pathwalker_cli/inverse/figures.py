@@ -206,9 +206,7 @@ def name_figure(figure: Figure, words: str) -> None:
 
 
 def _bands(
-    trials: Sequence[Trial],
-    columns: Callable[[Trial], Trajectory | None],
-    measured: bool = False,
+    trials: Sequence[Trial], columns: Callable[[Trial], Trajectory | None], measured: bool = False
 ) -> Bands:
     """Return the bands of the sides of which the trials show a complete gait cycle.
 

@@ -155,9 +155,7 @@ def _turned(recording: Recording, loads: list[ForcePlate], direction: str) -> li
 
 
 def _footprints(
-    model: pin.Model,
-    feet: Mapping[Side, np.ndarray],
-    aside: Mapping[Side, np.ndarray] | None,
+    model: pin.Model, feet: Mapping[Side, np.ndarray], aside: Mapping[Side, np.ndarray] | None
 ) -> dict[Side, Footprint]:
     """Return where both feet are on the ground, toes included."""
     neutral = foot_points(model, np.zeros((1, model.nq)))
