@@ -95,10 +95,7 @@ def run_frames(
 ) -> tuple[GaitFrames, ...]:
     """Return the strides of converged runs at the same shares of their gait cycles.
 
-    Args:
-        folders: The folders that `pathwalker solve` wrote.
-        rate: Instants per second of the first stride [1/s].
-        recorded: A trial to draw behind the first stride, see `recorded_frames`.
+    The first has so many instants per second [1/s], and the trial `recorded` behind it.
 
     Raises:
         DataError: If one is no run folder, did not converge, holds no full stride or comes twice.

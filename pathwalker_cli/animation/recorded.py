@@ -37,12 +37,7 @@ class RecordedFrames:
 
 
 def recorded_frames(walker: Walker, trial: str, count: int) -> RecordedFrames:
-    """Return the first right gait cycle of a trial.
-
-    Args:
-        walker: The walker of the child, in the condition of the trial.
-        trial: A C3D file, or the name of a recording beside the patient.
-        count: Number of instants.
+    """Return the first right gait cycle of a C3D file, or of a recording, at `count` instants.
 
     Raises:
         DataError: If there is no such trial, it cannot be used, or shows no such cycle.

@@ -36,8 +36,7 @@ def doctor_command(context: click.Context, as_json: bool) -> None:
     all_findings = findings()
     usable = all(finding.ok for finding in all_findings if finding.needed)
     if as_json:
-        content = {"usable": usable, "findings": [asdict(finding) for finding in all_findings]}
-        print_json(content)
+        print_json({"usable": usable, "findings": [asdict(finding) for finding in all_findings]})
     else:
         for finding in all_findings:
             mark = "ok" if finding.ok else ("MISSING" if finding.needed else "-")

@@ -72,13 +72,7 @@ def traces(
     labels: Sequence[str],
     recorded: Sequence[RecordedGait | None] | None = None,
 ) -> tuple[Trace, ...]:
-    """Return several gaits that differ in colour and line style.
-
-    Args:
-        gaits: The gaits.
-        labels: Their names in the legend.
-        recorded: Recordings to draw behind each; none if left out.
-    """
+    """Return several gaits that differ in colour and line style."""
     behind = recorded or [None] * len(gaits)
     rows = zip(gaits, labels, behind, strict=True)
     return tuple(
@@ -107,7 +101,7 @@ def draw_cycle(ax: Axes, curve: CycleCurve, shown: Sequence[Trace], side: Side) 
             _draw_range(ax, trace, np.array(lines))
     percent = np.linspace(0.0, 100.0, FINE)
     for trace in shown:
-        look, toe_off = trace.look(side), _toe_off(trace.gait, side)
+        look, toe_off = trace.look(side), toe_off_percent(trace.gait, side)
         for line in curve.lines(trace.gait, side, FINE):
             ax.plot(percent, line, **look)
             if curve.least_in_stance:
@@ -140,7 +134,7 @@ def _draw_range(ax: Axes, trace: Trace, curves: np.ndarray) -> None:
             ax.plot(band.percent, line, **trace.edge)
 
 
-def _toe_off(gait: Stride, side: Side) -> float:
+def toe_off_percent(gait: Stride, side: Side) -> float:
     """Return the position of the toe-off in the gait cycle [%]."""
     strike, toe_off = gait.stance(side)
     return 100.0 * (toe_off - strike) / gait.duration

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from pathwalker_cli.conventions import SIDES, Side, to_degrees
-from pathwalker_cli.evaluation.curves import FINE, Trace
+from pathwalker_cli.evaluation.curves import FINE, Trace, toe_off_percent
 from pathwalker_cli.evaluation.norms import norms, speed_class
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.stride.figures import style
@@ -65,8 +65,7 @@ def cycle_panel(curve: CycleCurve, shown: Sequence[Trace]) -> Figure:
             look = _look(shown, trace, side)
             for line in curve.lines(trace.gait, side, FINE):
                 ax.plot(np.linspace(0.0, 100.0, FINE), line, **look)
-            strike, toe_off = trace.gait.stance(side)
-            at = 100.0 * (toe_off - strike) / trace.gait.duration
+            at = toe_off_percent(trace.gait, side)
             tick = look | {"marker": "", "linewidth": 1.4}
             ax.plot([at, at], [0.0, _TICK], transform=ax.get_xaxis_transform(), **tick)
     style.percent_axis(ax, "")

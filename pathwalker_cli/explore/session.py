@@ -78,11 +78,7 @@ class Session:
         return extrapolated(self.optimum, below, above, _STEP, there)
 
     def solve(self, settings: Settings, start: Optimum | None = None) -> Optimum:
-        """Solve the problem with other settings and go there; if that fails, stay.
-
-        Args:
-            settings: Where the dials stand.
-            start: The same extrapolated, to begin with.
+        """Solve the problem with other settings, from `start`, and go there; if that fails, stay.
 
         Raises:
             InputError: If config or patient refuse the numbers.

@@ -28,13 +28,7 @@ Message = Mapping[str, Any]
 
 
 def serve_moves(connection: Connection, folder: Path, places: Path) -> None:
-    """Answer moves and saves until nobody asks any more.
-
-    Args:
-        connection: Where messages come from and answers go.
-        folder: The folder of the run.
-        places: The folder in which settings are saved.
-    """
+    """Answer moves of a run, and save settings below `places`, until nobody asks any more."""
     prepare_worker()
     try:
         Worker(connection, folder, places).run()

@@ -37,15 +37,7 @@ def c3d_trials(
 ) -> list[tuple[Trial, Recording]]:
     """Evaluate one C3D file: angles, events and, with force plates, forces, but no torques.
 
-    Args:
-        path: The file.
-        patient: The patient.
-        condition: What was worn.
-        config: What was chosen.
-        taken: Names of other recordings, which no pass takes.
-
-    Returns:
-        A trial for every pass, each with the recording as the file holds it.
+    No pass takes a name in `taken`.  Each trial comes with the recording as the file holds it.
 
     Raises:
         StandingError: If nobody walks.

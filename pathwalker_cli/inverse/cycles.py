@@ -113,7 +113,7 @@ def single_support(stance: Stance, events: Sequence[Event]) -> np.ndarray:
 def step_lengths(
     events: tuple[Event, ...], heels: Mapping[Side, np.ndarray], rate: float
 ) -> dict[Side, tuple[float, ...]]:
-    """Return the lengths of the steps of each side.
+    """Return the lengths of the steps of each side [m].
 
     A step reaches from the other foot's heel to the stepping foot's, each taken while its foot
     stands flat, which is a tenth to a quarter of a second after its strike.
@@ -122,9 +122,6 @@ def step_lengths(
         events: Foot strikes and toe-offs.
         heels: Per side, forward position of the heel [m], shape (n,).
         rate: Frames per second [1/s].
-
-    Returns:
-        Per side, lengths of its steps [m].
     """
     strikes = [event for event in events if event.kind == "foot_strike"]
     lengths: dict[Side, list[float]] = {side: [] for side in SIDES}
@@ -150,11 +147,7 @@ def walking_speed(motion: Trajectory) -> float:
 def joint_ranges(
     motions: Sequence[tuple[Trajectory, tuple[GaitCycle, ...]]],
 ) -> dict[str, tuple[float, float]]:
-    """Return the lowest and highest angle [rad] of every joint over gait cycles.
-
-    Args:
-        motions: Motions of several trials with their cycles.
-    """
+    """Return the lowest and highest angle [rad] of every joint over gait cycles."""
     ranges = {}
     for name in ANGLES:
         parts = [motion[name][cycle.rows] for motion, cycles in motions for cycle in cycles]
@@ -194,11 +187,7 @@ def resampled(columns: np.ndarray) -> np.ndarray:
 
 
 def cycle_band(trials: Sequence[tuple[Trajectory, tuple[GaitCycle, ...]]], side: Side) -> CycleBand:
-    """Return mean and spread of curves over the gait cycles of one side.
-
-    Args:
-        trials: Curves of several trials, NaN where not measured, with their gait cycles.
-        side: Side whose strike starts the cycle.
+    """Return mean and spread of curves, NaN where not measured, over the gait cycles of one side.
 
     Raises:
         DataError: If the trials show no complete cycle of that side.

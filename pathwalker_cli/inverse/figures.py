@@ -108,11 +108,7 @@ def ground_force_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
 
 
 def marker_figure(trials: Sequence[Trial]) -> Figure:
-    """Return the distance between every marker and the walker, mean and range over trials.
-
-    Args:
-        trials: Trials of one condition from C3D files.
-    """
+    """Return the distance between every marker and the walker, mean and range over C3D trials."""
     each = [trial.markers.rms() for trial in trials if trial.markers is not None]
     rms = {name: 1e3 * np.array([trial[name] for trial in each]) for name in each[0]}
     rms = {name: values for name, values in rms.items() if np.isfinite(values).any()}
@@ -145,11 +141,7 @@ def save_recorded_figures(
 ) -> tuple[str, ...]:
     """Save the figures that the trials of one condition allow; return the file names.
 
-    Args:
-        trials: Trials of one condition.
-        folder: Where; it must exist.
-        body_mass: Mass of the patient [kg].
-        formats: "png", "svg" or both.
+    Torques and forces are shown over `body_mass` [kg].
     """
     makers: dict[str, Callable[[], Figure]] = {}
     if any(trial.cycles for trial in trials):
@@ -171,12 +163,7 @@ def save_recorded_figures(
 def recorded_reference(patient: Patient, condition: Condition) -> Reference | None:
     """Return recorded joint angles as bands to draw behind those of a prediction.
 
-    Args:
-        patient: The patient.
-        condition: Condition of the recordings beside the patient's file.
-
-    Returns:
-        The bands, or None without usable recordings, which a prediction does not need.
+    None without usable recordings beside the patient's file: a prediction does not need them.
     """
     try:
         names = recording_names(patient, condition)
@@ -210,10 +197,7 @@ def _bands(
 ) -> Bands:
     """Return the bands of the sides of which the trials show a complete gait cycle.
 
-    Args:
-        trials: The trials.
-        columns: What to draw of a trial.
-        measured: Whether only cycles count whose stance has a measured force.
+    If `measured`, only cycles count whose stance has a measured force.
     """
     curves = []
     for trial in trials:

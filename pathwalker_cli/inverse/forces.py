@@ -108,7 +108,8 @@ def ground_forces(
     loads = plate_loads(recording, cutoff)
     if aside is None:
         direction = plate_direction(loads, feet, recording.events)
-        loads = _turned(recording, loads, direction)
+        axes = about_vertical(np.array(_HEADINGS[direction]))
+        loads = list(turned(replace(recording, plates=tuple(loads)), axes).plates)
     weight = GRAVITY * pin.computeTotalMass(model)
     prints = _footprints(model, feet, aside)
     faults = plate_faults(loads, stances(recording.events), prints, weight)
@@ -146,12 +147,6 @@ def plate_loads(recording: Recording, cutoff: float = FORCE_CUTOFF) -> list[Forc
         smooth = low_pass(wrench, recording.rate * per_frame, cutoff)[::per_frame][:frames]
         loads.append(replace(plate, force=smooth[:, :3], moment=smooth[:, 3:]))
     return loads
-
-
-def _turned(recording: Recording, loads: list[ForcePlate], direction: str) -> list[ForcePlate]:
-    """Return plates with x along a direction."""
-    axes = about_vertical(np.array(_HEADINGS[direction]))
-    return list(turned(replace(recording, plates=tuple(loads)), axes).plates)
 
 
 def _footprints(

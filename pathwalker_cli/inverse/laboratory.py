@@ -89,11 +89,8 @@ def differences(trial: Trial, body_mass: float) -> tuple[Difference, ...]:
     """Return ours minus what the file of a trial stores; nothing of what it does not.
 
     Angles count over the complete strides of their side, else over all frames; moments over the
-    stances that are measured and of which the laboratory's model knew the force too.
-
-    Args:
-        trial: The trial.
-        body_mass: Mass of the patient [kg].
+    stances that are measured and of which the laboratory's model knew the force too, per
+    `body_mass` [kg].
     """
     if trial.walk is None or not trial.walk.stored:
         return ()

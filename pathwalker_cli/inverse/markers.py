@@ -162,7 +162,9 @@ def bridge_gaps(
             gaps.append(Gap(name, first, frames, bridged))
             if bridged:
                 rows = np.arange(first, first + frames)
-                positions[rows, recording.markers.index(name)] = _interpolated(path, rows)
+                seen = np.flatnonzero(np.isfinite(path[:, 0]))
+                curve = PchipInterpolator(seen, path[seen], axis=0)
+                positions[rows, recording.markers.index(name)] = curve(rows)
     positions.setflags(write=False)
     return replace(recording, positions=positions), tuple(gaps)
 
@@ -171,9 +173,3 @@ def _runs(missing: np.ndarray) -> list[tuple[int, int]]:
     """Return first frame and length of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(int)))
     return [(int(a), int(b - a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _interpolated(path: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return the path at these rows from its seen frames."""
-    seen = np.flatnonzero(np.isfinite(path[:, 0]))
-    return np.asarray(PchipInterpolator(seen, path[seen], axis=0)(rows))

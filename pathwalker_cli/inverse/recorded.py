@@ -160,12 +160,7 @@ def with_block(text: str, key: str, lines: Sequence[str]) -> str:
     """Return the text of a YAML file with a block in place of the one under a key.
 
     Comments above the key stay; those within the block go.  A block that is not there yet is
-    added at the end.
-
-    Args:
-        text: The text of the file.
-        key: The outermost key.
-        lines: The block, the key's line among them.
+    added at the end.  The key is an outermost one; its line is the first of `lines`.
     """
     old = text.splitlines()
     begin = next((i for i, line in enumerate(old) if re.match(rf"{key}\s*:", line)), None)

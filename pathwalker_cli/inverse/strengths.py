@@ -93,13 +93,7 @@ class StrengthTable:
 def strength_table(
     trials: Sequence[Trial], patient: Patient, config: InverseDynamicsConfig
 ) -> StrengthTable:
-    """Return all strengths beside those of the patient's file.
-
-    Args:
-        trials: Trials of any condition; those with an orthosis are left out.
-        patient: The patient.
-        config: What counts as uncertain.
-    """
+    """Return all strengths by the barefoot trials, beside those of the patient's file."""
     barefoot = [t for t in trials if t.condition == "barefoot" and t.tau is not None]
     curves = stance_curves(barefoot, config.motion_cutoff, patient if config.tissue else None)
     peaks = extension_peaks(curves, any(trial.published for trial in barefoot))

@@ -37,13 +37,7 @@ def trials_renderable(trials: Iterable[Trial]) -> Table:
 
 
 def trial_content(trial: Trial, patient: Patient, limit: float) -> dict[str, Any]:
-    """Return what is known of a trial, as plain values.
-
-    Args:
-        trial: The trial.
-        patient: The patient.
-        limit: Mean distance of the markers that is a warning, in body heights.
-    """
+    """Return what is known of a trial, as plain values; see `warnings` for the limit."""
     return {
         "condition": trial.condition,
         "trial": trial.name,

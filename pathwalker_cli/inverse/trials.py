@@ -196,12 +196,7 @@ def _trial(
 
 
 def with_torques(trial: Trial, patient: Patient, cutoff: float = MOTION_CUTOFF) -> Trial:
-    """Return a trial with its torques, if its forces are known.
-
-    Args:
-        trial: The trial.
-        patient: The patient.
-        cutoff: Cut-off frequency of the motion [Hz].
+    """Return a trial with its torques, its motion cut off at a frequency [Hz], if forces are known.
 
     Raises:
         DataError: If the frames are too few for the cut-off frequency.

@@ -141,12 +141,7 @@ def is_projected(recording: Recording, points: tuple[MarkerPoint, ...]) -> bool:
 
 
 def orientation_doubts(walk: Recording, points: tuple[MarkerPoint, ...]) -> tuple[str, ...]:
-    """Return what contradicts a pass along +x of a person who faces it, a sentence each.
-
-    Args:
-        walk: A pass in the walking plane.
-        points: Where its markers sit.
-    """
+    """Return what contradicts a pass along +x of a person who faces it, a sentence each."""
     places = np.nanmean(_positions(walk, points), axis=0)
     doubts = []
     front = [i for i, p in enumerate(points) if p.link == "pelvis" and p.position[0] > 0.0]

@@ -144,9 +144,7 @@ def tight(text: str) -> str:
 def fact_table(rows: tuple[tuple[str, ...], ...], head: tuple[str, ...]) -> Table:
     """Return a table of sentences, a column per run; what all runs share is said once.
 
-    Args:
-        rows: Label, then a text per run.
-        head: Headings of the columns, the first of the labels.
+    A row is a label, then a text per run.
     """
     shared = (Row(row[:2], "shared") if len(set(row[1:])) == 1 else Row(row) for row in rows)
     return Table(head, tuple(shared), columns="w" + "p" * (len(head) - 1), even=True)

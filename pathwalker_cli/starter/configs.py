@@ -111,9 +111,7 @@ class ConfigFile:
 def config_files(seen: Seen, worn: bool) -> tuple[ConfigFile, ...]:
     """Return the configs of a new folder; C3D files are expected in c3d/.
 
-    Args:
-        seen: What is known of the child.
-        worn: Whether walks with an orthosis are recorded.
+    If `worn`, walks with an orthosis are among them.
     """
     with_orthosis = seen.with_orthosis
     patient = {"patient": "patient.yaml"}
