@@ -192,10 +192,8 @@ KINDS: Final[dict[str, Kind]] = {
 def check_file(path: str, problem: str = "", changes: Changes = ()) -> Checked:
     """Return what would be done with a file, after all checks that need no solve.
 
-    Args:
-        path: A file, the name of a shipped config, or a patient: id or folder.
-        problem: Problem that it must be of.
-        changes: Overrides "dotted.key=value" of a config.
+    It is a path, the name of a shipped config, or a patient; if a problem is named, it must be of
+    that.
 
     Raises:
         InputError: The first thing that is wrong.

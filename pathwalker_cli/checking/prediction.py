@@ -90,12 +90,9 @@ class Seconds:
 
 
 def expected(config: StudyConfig, intervals: int) -> Seconds:
-    """Return how long a solve may take.
+    """Return how long a solve may take that begins with so many intervals.
 
-    Args:
-        config: The study.
-        intervals: Intervals of its first mesh; unknowns, and seconds per iteration, are in
-            proportion to their collocation points.
+    Unknowns, and seconds per iteration, are in proportion to their collocation points.
     """
     refined = config.mesh.refinements > 0
     measured = MEASURED[config.problem][refined]

@@ -58,7 +58,7 @@ def ankle_figure(trace: Trace) -> Figure:
 
 
 def cycle_pairs(curves: Sequence[CycleCurve], shown: Sequence[Trace], head: float = 0.0) -> Figure:
-    """Return a figure with a row of right and left side per quantity, below `head` [in] for a legend."""
+    """Return a row of right and left side per quantity, below `head` [in] for a legend."""
     fig = style.new_figure(head + PAIR_HEIGHT * len(curves))
     panels = fig.subplots(len(curves), 2, sharey="row", squeeze=False)
     for row, curve in zip(panels, curves, strict=True):

@@ -68,7 +68,7 @@ class PaperNumber:
         return float(10.0**-digits) * _TO_SI.get(self.unit, 1.0)
 
     def agrees(self, value: float) -> bool:
-        """Return whether a value in SI units, truncated or rounded, prints as this number, or in its range."""
+        """Return whether a value [SI], truncated or rounded, prints as this number or within it."""
         low, high = self.bounds
         rounding = 1e-9 * self.step
         if self.upper:

@@ -142,15 +142,9 @@ class Gap:
 def bridge_gaps(
     recording: Recording, markers: tuple[str, ...], longest: float = LONGEST_GAP
 ) -> tuple[Recording, tuple[Gap, ...]]:
-    """Interpolate short gaps by monotone cubics; leave long ones and those at the ends.
+    """Interpolate gaps up to a length [s] by monotone cubics; leave those at the ends.
 
-    Args:
-        recording: The recording.
-        markers: Markers to look at.
-        longest: Longest gap that is bridged [s].
-
-    Returns:
-        The recording without the short gaps, and every gap that there was.
+    The recording comes back without them, and with it every gap that there was.
     """
     positions = recording.positions.copy()
     gaps: list[Gap] = []

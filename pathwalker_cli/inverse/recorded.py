@@ -106,13 +106,9 @@ def update_patient(
     source: str,
     blocks: Mapping[Condition, tuple[Recorded, int]],
 ) -> None:
-    """Put strengths and ranges of recorded gait into a patient's file.
+    """Put strengths [N m] with their source, and `recorded_blocks`, into a patient's file.
 
-    Args:
-        path: The file.
-        strengths: Strengths [N m]; None to keep those that are there.
-        source: Where they come from, one line.
-        blocks: Ranges and number of trials by condition, from `recorded_blocks`.
+    Strengths that are None, and blocks of no condition, leave what is there.
     """
     text = path.read_text(encoding="utf-8")
     if strengths is not None:

@@ -74,12 +74,9 @@ class ResidualTable:
 
 
 def residuals(trial: str, tau: np.ndarray, frames: np.ndarray | None = None) -> Residuals:
-    """Return the residuals of a trial over the frames in which they are known.
+    """Return the residuals of a trial over the frames, of all or of those given, that tell them.
 
-    Args:
-        trial: Name of the trial.
-        tau: Generalised forces [N, N m], NaN where a force is not measured, shape (n, 10).
-        frames: Frames to look at; all if left out.
+    `tau` holds generalised forces [N, N m], NaN where a force is not measured, shape (n, 10).
     """
     root = (tau if frames is None else tau[frames])[:, _ROOT]
     known = root[np.isfinite(root).all(axis=1)]

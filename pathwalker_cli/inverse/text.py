@@ -138,10 +138,7 @@ def _table(
 def warnings(trial: Trial, height: float, share: float) -> tuple[str, ...]:
     """Return a sentence for everything about a trial that may be wrong.
 
-    Args:
-        trial: The trial.
-        height: Height of the patient [m].
-        share: Mean distance of the markers that is a warning, as a share of the height.
+    Markers are too far away from a share of the patient's height [m] on, on average.
     """
     found = list(trial.doubts)
     if trial.markers is not None and trial.markers.mean > share * height:

@@ -157,12 +157,9 @@ def recorded_trials(
 def read_trials(
     folder: Path, condition: Condition, stances: Sequence[Mapping[str, str]]
 ) -> tuple[Trial, ...]:
-    """Return the trials of one condition as far as the files of an earlier study tell.
+    """Return the trials of one condition as far as the folder of an earlier study tells.
 
-    Args:
-        folder: Folder that `pathwalker id` wrote.
-        condition: The condition.
-        stances: Rows of its `stances.csv` by heading without unit.
+    Rows of its `stances.csv` go by heading without unit.
 
     Raises:
         DataError: If a file of a trial cannot be used.

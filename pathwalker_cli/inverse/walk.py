@@ -105,12 +105,7 @@ def cut(recording: Recording, first: int, end: int) -> Recording:
 
 
 def turned(recording: Recording, axes: np.ndarray) -> Recording:
-    """Return a recording in other axes, markers and plates alike.
-
-    Args:
-        recording: The recording.
-        axes: The new axes in the old ones, one a row, shape (3, 3).
-    """
+    """Return a recording, plates too, in axes that are given in the old ones, a row each (3, 3)."""
     positions = recording.positions @ axes.T
     positions.setflags(write=False)
     plates = tuple(

@@ -316,12 +316,8 @@ def healthy_child() -> Patient:
 def healthy_strength(name: str, body_mass: float, height: float) -> float:
     """Return a maximum isometric torque of a healthy child, the shipped one grown or shrunk [N m].
 
-    A torque is a force, which grows with body mass, times a lever, which grows with height.
-
-    Args:
-        name: Field of `Strengths`, e.g. "hip_extension".
-        body_mass: Body mass of the child [kg].
-        height: Height of the child [m].
+    A torque is a force, which grows with body mass [kg], times a lever, which grows with height
+    [m].  The name is a field of `Strengths`.
     """
     child, same = healthy_child(), f"strengths.{name}.right"
     return child.number(same) * (body_mass * height) / (child.body_mass * child.height)

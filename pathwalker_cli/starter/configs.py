@@ -31,14 +31,9 @@ def unbroken(text: str) -> str:
 
 
 def commented(key: str, value: str, text: str, depth: int = 0, given: bool = True) -> str:
-    """Return a key with its value below its comment.
+    """Return a key with its value, "" for a block, below its comment, so many blocks further in.
 
-    Args:
-        key: The key.
-        value: Its value; "" for a block.
-        text: The comment; "" for none.
-        depth: How many blocks it stands in.
-        given: Whether the value counts; otherwise the line is a comment, too.
+    What is not `given` is written as a comment, too.
     """
     mark = "  " * depth + ("" if given else "# ")
     line = f"{mark}{key}: {value}".replace(": \n", ":\n").rstrip()
