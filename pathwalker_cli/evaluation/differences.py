@@ -102,8 +102,7 @@ def rms_mean_cycle(stride: Stride, recorded: RecordedGait) -> dict[str, float]:
 
 def recorded_rms_mean_cycle(recorded: RecordedGait) -> dict[str, Spread]:
     """Return the RMS difference of single recorded cycles to their mean [rad], by joint."""
-    cycles = (cycle for side in SIDES for cycle in recorded.of("stride", side))
-    return _spreads(rms_mean_cycle(cycle, recorded) for cycle in cycles)
+    return _spreads(rms_mean_cycle(cycle, recorded) for cycle in recorded.cycles)
 
 
 def force_rms(stride: Stride, recorded: RecordedGait) -> dict[str, float]:

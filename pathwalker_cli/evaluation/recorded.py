@@ -12,7 +12,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.evaluation.paper import PATIENT, REFERENCE_STRIDES
-from pathwalker_cli.inverse.cycles import GaitCycle, resampled, stances
+from pathwalker_cli.inverse.cycles import OTHER, GaitCycle, resampled, stances
 from pathwalker_cli.inverse.dynamics import frame_rate
 from pathwalker_cli.inverse.recorded import trial_steps
 from pathwalker_cli.inverse.strengths import stance_curves
@@ -166,8 +166,7 @@ def _cycle(walker: Walker, trial: Trial, cycle: GaitCycle, rate: float) -> Strid
         if e.side != side and start < e.frame < cycle.toe_off
     }
     if other.keys() == {"toe_off", "foot_strike"}:
-        away = next(s for s in SIDES if s != side)
-        spans[away] = other["foot_strike"] / rate, (other["toe_off"] + frames) / rate
+        spans[OTHER[side]] = other["foot_strike"] / rate, (other["toe_off"] + frames) / rate
     known: dict[str, Any] = {"side": side, "stances": spans, "time": np.arange(frames + 1) / rate}
     if trial.forces is not None:
         known["force"] = {side: _in_the_air_at_last(_forces(trial, side), cycle)}

@@ -76,12 +76,7 @@ def joint_angle_figure(trials: Sequence[Trial]) -> Figure:
 
     Flexion, dorsiflexion and forward lean are positive, as gait laboratories plot them.
     """
-    bands = _bands(trials, lambda trial: trial.motion)
-    fig = new_figure(3.9)
-    panels = fig.subplots(3, 2).ravel()
-    _draw(panels, bands, _ANGLES)
-    legend_panel(panels[-1], _handles(bands, "hip_{}", "stride"))
-    return fig
+    return _joint_figure(_bands(trials, lambda trial: trial.motion), _ANGLES, 3.9, "stride")
 
 
 def joint_torque_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
@@ -91,11 +86,7 @@ def joint_torque_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
     measured force count.
     """
     bands = _bands(trials, lambda trial: trial.tau, measured=True)
-    fig = new_figure(2.9)
-    panels = fig.subplots(2, 2).ravel()
-    _draw(panels, bands, _TORQUES, body_mass)
-    legend_panel(panels[-1], _handles(bands, "hip_{}", "measured stride"))
-    return fig
+    return _joint_figure(bands, _TORQUES, 2.9, "measured stride", body_mass)
 
 
 def ground_force_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
@@ -209,6 +200,17 @@ def _bands(
     if not seen:
         raise DataError("the trials show no complete gait cycle")
     return {side: cycle_band(curves, side) for side in SIDES if side in seen}
+
+
+def _joint_figure(
+    bands: Bands, panels: Panels, height: float, thing: str, per: float = 1.0
+) -> Figure:
+    """Return panels in two columns, so high [in], with the legend in the last place."""
+    fig = new_figure(height)
+    axes = fig.subplots(len(panels) // 2 + 1, 2).ravel()
+    _draw(axes, bands, panels, per)
+    legend_panel(axes[-1], _handles(bands, "hip_{}", thing))
+    return fig
 
 
 def _draw(axes: Iterable[Axes], bands: Bands, panels: Panels, per: float = 1.0) -> None:
