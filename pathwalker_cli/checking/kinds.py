@@ -154,13 +154,7 @@ Check = Callable[[str, Changes], Checked]
 
 
 class Kind(NamedTuple):
-    """What a kind of file is read as, who checks it, and what takes it.
-
-    Args:
-        model: Model of its content.
-        check: Says what would be done with it.
-        taken_by: The command or key that it is for.
-    """
+    """What a kind of file is read as, who checks it, and the command or key that takes it."""
 
     model: type[BaseModel]
     check: Check

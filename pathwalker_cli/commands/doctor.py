@@ -13,13 +13,9 @@ from pathwalker_cli.commands.options import json_option, print_json
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """One thing that was looked at, what was found, or what is missing and how to get it.
 
-    Args:
-        name: What it is.
-        ok: Whether it is in order.
-        needed: Whether nothing can be solved without it.
-        detail: What was found, or what is missing and how to get it.
+    Without what is needed nothing can be solved.
     """
 
     name: str

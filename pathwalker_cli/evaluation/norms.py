@@ -41,11 +41,9 @@ QUANTITIES: Final = {
 
 @dataclass(frozen=True)
 class Norm:
-    """One quantity of typical children of a speed class.
+    """Mean and standard deviation between typical children of a speed class.
 
-    Args:
-        mean: Mean over the gait cycle, 51 points from 0 to 100 %, in the unit of the curve.
-        sd: Standard deviation between children, likewise.
+    Over the gait cycle, 51 points from 0 to 100 %, in the unit of the curve.
     """
 
     mean: np.ndarray

@@ -30,7 +30,7 @@ class PaperNumber:
     Args:
         subject: What it is about: a problem ("mapd-barefoot"), "recorded-barefoot" or
             "recorded-orthosis", "change" (from barefoot to orthosis), "patient" or "healthy".
-        quantity: Name of the quantity; those of a gait are the keys of `quantities.QUANTITIES`.
+        quantity: Name of the quantity; those of a gait are the keys of its measures.
         text: The digits as printed; the lower end of a range.
         unit: Unit as printed.
         place: Where in the article.
@@ -79,12 +79,9 @@ class PaperNumber:
 
 @dataclass(frozen=True)
 class PaperClaim:
-    """A change from barefoot to orthosis that the article states in words.
+    """A change from barefoot to orthosis that the article states in words, and where.
 
-    Args:
-        quantity: A key of `quantities.QUANTITIES`, without the side.
-        rises: Whether it is said to rise.
-        place: Where in the article.
+    The quantity is the key of a measure, without the side.
     """
 
     quantity: str

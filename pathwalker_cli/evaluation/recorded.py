@@ -57,11 +57,9 @@ def spread(values: Iterable[float]) -> Spread | None:
 
 @dataclass(frozen=True)
 class RecordedGait:
-    """All recordings of a patient in one condition.
+    """All recordings of a patient in the condition of its walker, which carries the weight.
 
-    Args:
-        walker: The patient's walker in that condition; it carries the weight.
-        trials: The trials with angles, events and, where measured, forces and torques.
+    Trials have angles, events and, where measured, forces and torques.
     """
 
     walker: Walker

@@ -23,11 +23,9 @@ _STEP: Final = 1e-4
 
 
 class Session:
-    """The optimum that is looked at, and those around it.
+    """The optimum of a run that is looked at, and those around it.
 
-    Args:
-        run: The run.
-        observer: Hears every iteration, and may end a solve.
+    The observer hears every iteration, and may end a solve.
 
     Raises:
         NotConvergedError: If the run cannot be solved again.

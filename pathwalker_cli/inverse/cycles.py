@@ -25,13 +25,7 @@ FLAT: Final = (0.1, 0.25)
 
 @dataclass(frozen=True)
 class Stance:
-    """A foot on the ground.
-
-    Args:
-        side: "right" or "left".
-        strike: Frame of the foot strike.
-        toe_off: Frame of the toe-off.
-    """
+    """A foot on the ground, from the frame of its strike to that of its toe-off."""
 
     side: Side
     strike: int
@@ -45,13 +39,9 @@ class Stance:
 
 @dataclass(frozen=True)
 class GaitCycle:
-    """A stride: from a foot strike to the next one of the same foot.
+    """A stride: from a foot strike to the next one of the same foot, with the toe-off in between.
 
-    Args:
-        side: "right" or "left".
-        start: Frame of the first strike.
-        toe_off: Frame of the toe-off in between.
-        end: Frame of the next strike.
+    All three are frames.
     """
 
     side: Side

@@ -124,13 +124,9 @@ def _position(entry: MarkerEntry, lengths: dict[str, float], scale: float) -> tu
 
 @dataclass(frozen=True)
 class Gap:
-    """A run of frames in which a marker was not seen.
+    """A run of frames in which a marker was not seen, and whether its path was interpolated there.
 
-    Args:
-        marker: Name of the marker.
-        first: First frame without it.
-        frames: Number of frames without it.
-        bridged: Whether the path was interpolated there.
+    `first` is the first frame without it, `frames` their number.
     """
 
     marker: str

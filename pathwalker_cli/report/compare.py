@@ -78,12 +78,9 @@ class Compared:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Several runs side by side.
+    """Several runs, of which the first is the base, side by side.
 
-    Args:
-        gaits: Their gaits under names that differ; the first is the base.
-        rows: Metrics that some run has.
-        config: Keys of the configs whose values differ, with the value of each run.
+    `config` holds the keys of the configs whose values differ, with the value of each run.
     """
 
     gaits: tuple[Stride, ...]

@@ -52,12 +52,7 @@ EXAMPLE_NOTE: Final = (
 
 @dataclass(frozen=True)
 class Step:
-    """One thing to do with a folder.
-
-    Args:
-        why: What it is for, a sentence.
-        commands: Commands, from within the folder.
-    """
+    """One thing to do within a folder: what it is for, in a sentence, and the commands."""
 
     why: str
     commands: tuple[str, ...] = ()
