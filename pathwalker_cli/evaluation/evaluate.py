@@ -123,10 +123,7 @@ class Evaluation:
         Raises:
             KeyError: If it was left out.
         """
-        found = self.find(key)
-        if found is None:
-            raise KeyError(key)
-        return found
+        return {row.measure.key: row for row in self.rows}[key]
 
     def find(self, key: str) -> Row | None:
         """Return the row of a measure, None if it was left out."""
