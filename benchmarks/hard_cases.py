@@ -27,6 +27,7 @@ from pathwalker_cli.gait.solution import TOO_WEAK
 from pathwalker_cli.patient.file import healthy_strength
 from pathwalker_cli.starter.child import made_child
 from pathwalker_cli.starter.files import folder_files
+from pathwalker_cli.starter.seen import Seen
 
 AGES: Final = (4.0, 6.5, 9.0, 12.0, 15.0)
 PROBLEMS: Final = ("mapd-barefoot", "mapd-orthosis")
@@ -126,7 +127,7 @@ def write_child(case: Case, folder: Path) -> None:
         round(usual.body_mass * kind.mass, 1),
         round(usual.height * kind.height, 2),
     )
-    texts = folder_files(child, True, False)
+    texts = folder_files(child, Seen(), False)
     patient, orthosis = (yaml.safe_load(texts[f"{name}.yaml"]) for name in ("patient", "orthosis"))
     for name in patient["strengths"]:
         whole = healthy_strength(name, usual.body_mass, usual.height)

@@ -23,6 +23,7 @@ from pathwalker_cli.model.parts import Parts
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.stride.ground import touched
+from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import gait_series
 from pathwalker_cli.stride.stride import contacts, stride_of
 from pathwalker_cli.stride.verify import second_engine_residual
@@ -56,12 +57,12 @@ def floating(inertia: float, lever: float, bottom: float, slope: float = 0.0) ->
 
 def acceleration(body: RigidBodyFunctions, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return the accelerations of a body whose contact neither slips nor lifts."""
-    theta, still = body.parameters, np.zeros(3)
+    theta, still = body.parameters, np.zeros(body.nq)
     mass, bias = np.array(body.mass_matrix(q, theta)), np.array(body.bias(q, v, theta)).ravel()
     jacobian = np.array(body.point_jacobian(q, theta))
     drift = np.array(body.point_accelerations(q, v, still, theta)).ravel()
     matrix = np.block([[mass, -jacobian.T], [jacobian, np.zeros((2, 2))]])
-    return np.asarray(np.linalg.solve(matrix, np.concatenate([-bias, -drift]))[:3])
+    return np.asarray(np.linalg.solve(matrix, np.concatenate([-bias, -drift]))[: body.nq])
 
 
 def rolled(body: RigidBodyFunctions, turn: float, speed: float, time: np.ndarray) -> np.ndarray:
@@ -107,6 +108,39 @@ def test_a_half_disc_rocks_in_its_time() -> None:
     assert np.array(body.point_positions(x[50, :3], body.parameters))[1] == pytest.approx(
         0.0, abs=1e-10
     )
+
+
+def test_a_passive_walker_on_round_feet_repeats_its_step() -> None:
+    """The synthetic wheel: feet of the leg's length, light legs; its step lasts 4.058 / omega.
+
+    omega is the frequency of the free leg, and the step is the same for all (small) lengths.
+
+    References:
+        McGeer (1990) Int. J. Robot. Res. 9(2):62-82, the synthetic wheel.
+    """
+    length, centre, radius, light, begin = 0.8, 0.3, 0.2, 1e-6, 0.005
+    model = floating(1.0, 0.0, length)  # all of its mass at the hip
+    leg = model.addJoint(3, pin.JointModelRY(), pin.SE3.Identity(), "hip")
+    inertia = light * np.diag([radius**2, radius**2, radius**2])
+    model.inertias[leg] = pin.Inertia(light, np.array([0.0, 0.0, -centre]), inertia)
+    body = rigid_body_functions(model, ("bottom",), shapes=(length,))
+    omega = np.sqrt(9.81 * centre / (radius**2 + centre**2))
+    step = 4.058 / omega
+    rate = 2 * begin / step
+    # the standing leg reaches forward, the other one, which stood before, is as far behind
+    q = np.array([0.0, 0.0, -begin, 2 * begin])
+    q[1] = -float(np.array(body.point_positions(q, body.parameters))[1, 0])
+    jacobian = np.array(body.point_jacobian(q, body.parameters))
+    v = np.append(-np.linalg.solve(jacobian[:, :2], jacobian[:, 2] * rate), [rate, 0.0])
+
+    def change(_: float, x: np.ndarray) -> np.ndarray:
+        return np.concatenate([x[4:], acceleration(body, x[:4], x[4:])])
+
+    end = solve_ivp(change, (0.0, step), np.concatenate([q, v]), "DOP853", rtol=1e-11, atol=1e-13)
+    x = end.y[:, -1]
+    assert x[2] == pytest.approx(begin, rel=1e-3)
+    assert x[2] + x[3] == pytest.approx(-begin, rel=1e-3)
+    assert x[6] == pytest.approx(rate, rel=1e-3)  # a wheel goes on as it began
 
 
 @pytest.mark.parametrize("backend", available_backends())
@@ -291,3 +325,30 @@ def test_shapes_are_numbers_like_all_others() -> None:
     assert ca.DM(moved.rigid_body.parameters).is_regular()
     given = PATIENT.model_copy(update={"numbers": {"rocker_radius.heel": 0.05}})
     assert build_walker(given, feet="rockers").shapes[0] == 0.05
+
+
+def test_a_calf_that_is_too_short_walks_on_its_toes() -> None:
+    """Alike on soles, where it comes out, and with a pattern in which no heel ever stands."""
+    short = {f"examination.dorsiflexion_knee_{knee}.{side}": reach for side in ("right", "left")
+             for knee, reach in (("extended", -20.0), ("flexed", -15.0))}  # fmt: skip
+    walks = {}
+    for feet, contact in (("sole", "heel_toe"), ("rockers", "toe")):
+        values = {"numbers": short, "model.feet": feet, "model.contact": contact,
+                  "mesh.intervals": (14, 7, 14, 7), "mesh.refinements": 0,
+                  "solver.tolerance": 1e-4, "verdict": False}  # fmt: skip
+        solution = solve_study(with_values(load_config("predict-barefoot"), values))
+        assert solution.converged
+        walks[feet] = stride_of(gait_series(solution.walker, solution.last_motion))
+    metrics = {feet: metrics_of(stride) for feet, stride in walks.items()}
+    for key, apart in (("walking_speed", 0.05), ("stride_time", 0.06),
+                       ("min_stance_knee_flexion_right", 0.05)):  # fmt: skip
+        assert metrics["sole"][key] == pytest.approx(metrics["rockers"][key], abs=apart), key
+    stride = walks["sole"]
+    for side, index in (("right", 0), ("left", 1)):
+        assert metrics["sole"][f"strike_index_{side}"] > 2 / 3  # lands on the forefoot
+        heel, toe = (
+            np.array([stride.walker.foot_points(q)[2 * index + k, 0] for q in stride.q])
+            for k in (0, 1)
+        )
+        share = (stride.contact_position[:, index, 0] - heel) / (toe - heel)
+        assert share[stride.stands(side)].min() > 0.6  # type: ignore[arg-type]

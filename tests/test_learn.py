@@ -30,7 +30,8 @@ NUMBERS = (
     "cost.goals.time: {prior: 0.5, factor: 3.0, range: [0.02, 10.0]}}"
 )
 SMOKE = (
-    "set={learnt: null, mesh.intervals: [2, 2, 2, 2, 2, 2, 2, 2], mesh.refinements: 0, "
+    "set={learnt: null, model.feet: points, mesh.intervals: [2, 2, 2, 2, 2, 2, 2, 2], "
+    "mesh.refinements: 0, "
     "cost.goals: {steady_trunk: 1.5, upright_trunk: 4.5, level_foot: 2.0}, "
     "cost.acceleration_weight: 0.05, cost.activation_power: 2, solver.tolerance: 1.0e-7}"
 )
@@ -200,9 +201,10 @@ def test_slopes_are_those_of_solves(
     predictions = learner(study, run, targets, tmp_path)
     at = np.zeros(3)
     slopes = predictions.slopes(at)
-    for i, step in enumerate(0.02 * np.eye(3)):
+    # bounds become active a little further off, and bend the way
+    for i, step in enumerate(0.004 * np.eye(3)):
         above, below = (predictions.misfit(at + sign * step) for sign in (1.0, -1.0))
-        difference = (above - below) / 0.04
+        difference = (above - below) / 0.008
         scale = np.linalg.norm(difference)
         assert np.linalg.norm(slopes[:, i] - difference) < 0.1 * scale
 
@@ -275,7 +277,7 @@ def test_a_second_call_solves_nothing_again(learnt: tuple[Path, Result], run: Ru
 
 
 def test_a_run_that_does_not_weigh_a_goal_is_refused(tmp_path: Path) -> None:
-    changes = ("learnt=null", "mesh.intervals=[2, 2, 2, 2, 2, 2, 2, 2]", "mesh.refinements=0")
+    changes = ("learnt=null", "mesh.intervals=[10, 5, 10, 5]", "mesh.refinements=0")
     case = load_case("predict-barefoot", changes=(*changes, "cost.activation_power=2"))
     run_study(case, tmp_path / "run")
     words = ["learn", "learn", "--run", str(tmp_path / "run"), "--set", "set={}"]

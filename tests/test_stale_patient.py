@@ -80,6 +80,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "report": ("worn", "bare", "-o", "out.html"),
     "animate": ("worn", "bare", "-o", "out.html"),
     "view": ("worn", "--no-open"),
+    "explore": ("worn", "-o", "out.html"),
     "batch": ("batch.yaml", "-o", "out"),
 }  # fmt: skip
 """Arguments by command; `worn` and `bare` are the runs, `out` is what is written."""

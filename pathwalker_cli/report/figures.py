@@ -55,8 +55,8 @@ def curve_section(runs: Sequence[ReportRun]) -> Section:
     drawings.append(drawn(partial(legend_panel, shown), "legend", "Legend of the curves", "panel"))
     line = (
         "Each side from its own foot strike (0 %) to its next one. Joint moments are internal, "
-        "those of muscles, tissue and orthosis; they jump where the rigid foot of the model "
-        "changes its support. Slopes: torque over angle in stance, in the order of the legend."
+        "those of muscles, tissue and orthosis; on feet of points they jump where the support "
+        "changes. Slopes: torque over angle in stance, in the order of the legend."
     )
     return Section("Curves over the gait cycle", (line,), drawings=tuple(drawings), new_page=True)
 

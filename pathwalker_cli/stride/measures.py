@@ -39,7 +39,13 @@ from pathwalker_cli.stride.measure import (
     Measure,
     per_side,
 )  # fmt: skip
-from pathwalker_cli.stride.stride import LOADED_SHARE, Stride, contacts, toe_bearing
+from pathwalker_cli.stride.stride import (
+    LOADED_SHARE,
+    NotKnownError,
+    Stride,
+    contacts,
+    toe_bearing,
+)
 
 
 def _effort(stride: Stride) -> float:
@@ -148,6 +154,9 @@ def _ankle_extensor(stride: Stride, side: Side, of: str, mean: bool) -> float:
 def _strike_index(stride: Stride, side: Side) -> float:
     """Return where between heel (0) and toe (1) a foot first touches the ground."""
     pose = stride.pose(stride.strike(side))
+    pose[:2] = 0.0  # where the pelvis is does not matter, and recordings may not know it
+    if not np.isfinite(pose).all():
+        raise NotKnownError("q")
     heel, toe = stride.walker.foot_points(pose)[2 * SIDES.index(side) :][:2]
     pattern = stride.walker.pattern
     places = stride.walker.contact_points(pose)[pattern.rows(side)]
@@ -238,7 +247,7 @@ REGISTRY: tuple[Measure, ...] = (
             lambda s: s.walker.weight, shown=False),
     *per_side("strike_index_*", "strike index, *", "1",
               "where from heel to toe a foot lands: rearfoot below 1/3, forefoot above 2/3 "
-              "(Cavanagh and Lafortune 1980)", _strike_index, section=WALK, shown=False),
+              "(Cavanagh and Lafortune 1980)", _strike_index, section=WALK, part="stance"),
     *per_side("peak_vertical_force_*", "peak vertical force, *", "N",
               "largest vertical ground reaction force", _peak_vertical_force, section=FORCE,
               part="stance", shown=False),
@@ -319,7 +328,7 @@ TABLES: Final[Mapping[str, Sequence[str]]] = {
     "summary": ("walking_speed", "distance", "stride_time", "step_length_*", _CROUCH, *_SPRINGS),
     "evaluate": (
         "walking_speed", "step_length_*", "stride_time", "cadence", *_NORMALISED, *_TIMES,
-        "ankle_torque_slope_stance_*", "peak_net_ankle_torque_*",
+        "strike_index_*", "ankle_torque_slope_stance_*", "peak_net_ankle_torque_*",
         *(f"{kind}_ankle_extension_{name}_*" for name in ("torque", "activation")
           for kind in ("peak", "mean")),
         "effort_per_distance", *_SPRINGS,
