@@ -25,14 +25,7 @@ from matplotlib.patches import Patch, Polygon
 from matplotlib.text import Text
 from matplotlib.ticker import FormatStrFormatter, MultipleLocator
 
-from pathwalker_cli.animation.drawing import (
-    Drawing,
-    View,
-    common_view,
-    drawing,
-    force_scale,
-    words,
-)
+from pathwalker_cli.animation.drawing import Drawing, View, common_view, drawing, force_scale, words
 from pathwalker_cli.animation.frames import GaitFrames
 from pathwalker_cli.animation.look import (
     ACTIVATION_COLOURS,

@@ -10,16 +10,11 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.animation.recorded import RecordedFrames, recorded_frames
+from pathwalker_cli.animation.recorded import RecordedFrames, body_paths, recorded_frames
 from pathwalker_cli.conventions import SIDES, Condition, Side
 from pathwalker_cli.evaluation.run import run_names, run_notes, stride_of_run
 from pathwalker_cli.stride.series import GaitSeries
-from pathwalker_cli.stride.stride import (
-    body_points,
-    centre_of_pressure,
-    stride_of,
-    switching_times,
-)
+from pathwalker_cli.stride.stride import centre_of_pressure, stride_of, switching_times
 
 _CLOSED: Final = 1e-3
 """Difference between beginning and end of a stride [m, rad] below which it repeats itself."""
@@ -100,10 +95,7 @@ def run_frames(
 ) -> tuple[GaitFrames, ...]:
     """Return the strides of converged runs at the same shares of their gait cycles.
 
-    Args:
-        folders: The folders that `pathwalker solve` wrote.
-        rate: Instants per second of the first stride [1/s].
-        recorded: A trial to draw behind the first stride, see `recorded_frames`.
+    The first has so many instants per second [1/s], and the trial `recorded` behind it.
 
     Raises:
         DataError: If one is no run folder, did not converge, holds no full stride or comes twice.
@@ -130,7 +122,8 @@ def gait_frames(
     later = strike + series.duration * np.arange(count) / count
     again = later >= series.duration
     time = np.where(again, later - series.duration, later)
-    points, phase = _points(series, time), _phases(series, time)
+    points = body_paths(series.walker, _at(series.time, series.q, time))
+    phase = _phases(series, time)
     ahead = np.where(again, series.distance, 0.0) - points["heel_r"][0, 0]
     feet = dict(
         zip(SIDES, _in_phase(series, _feet(series), time, phase).swapaxes(0, 1), strict=True)
@@ -182,12 +175,6 @@ def _in_phase(
         wanted, known = np.array(phase) == name, np.array(series.phase) == name
         sampled[wanted] = _at(series.time[known], values[known], time[wanted])
     return sampled
-
-
-def _points(series: GaitSeries, time: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the points of the body at some instants [m], shape (len(time), 2) each."""
-    bodies = [body_points(series.walker, q) for q in _at(series.time, series.q, time)]
-    return {name: np.array([body[name] for body in bodies]) for name in bodies[0]}
 
 
 def _phases(series: GaitSeries, time: np.ndarray) -> tuple[str, ...]:

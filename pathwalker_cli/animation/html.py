@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any, Final
 
 import numpy as np
-from jinja2 import Environment, Template
+from jinja2 import Environment
 
 from pathwalker_cli.animation.drawing import (
     Drawing,
@@ -59,15 +59,14 @@ def html_page(runs: Sequence[GaitFrames], video: Video | None = None) -> str:
 
     Names of runs come from folders: the template escapes them in text and data alike.
 
-    Args:
-        runs: The strides.
-        video: A video beside them: a stride of it takes as long as the recorded one behind the
-            first walker, or else as that walker's own.
+    A stride of the video beside them takes as long as the recorded one behind the first walker, or
+    else as that walker's own.
     """
     drawings = [drawing(frames) for frames in runs]
     view, first = common_view(drawings), runs[0]
     stride = first.recorded.duration if first.recorded else first.duration
-    return _template().render(
+    template = page_templates().get_template("animation/page.html")
+    return template.render(
         title=" and ".join(frames.name for frames in runs),
         pace=pace(runs),
         video=video,
@@ -86,10 +85,7 @@ def walkers_content(
 ) -> dict[str, Any]:
     """Return what `walker.html` needs of some strides: looks, words, and what is seen.
 
-    Args:
-        drawings: The strides.
-        view: What is seen of them.
-        shadow_name: What the shadows behind them are; "" if there are none.
+    The shadows behind them have a name, "" if there are none.
     """
     return {
         "caveat": CAVEAT,
@@ -109,11 +105,6 @@ def walkers_content(
 
 
 @cache
-def _template() -> Template:
-    """Return the template of the page."""
-    return page_templates().get_template("animation/page.html")
-
-
 def page_templates() -> Environment:
     """Return the templates of pages with walkers, by their place in the package."""
     environment = templates("pathwalker_cli", ".")
@@ -156,7 +147,10 @@ def stride_data(each: Drawing) -> dict[str, Any]:
         "middle": frames.middle,
         "phases": [words(name) for name in frames.phase],
         "points": {name: _rounded(xz, 4) for name, xz in each.points.items()},
-        "arrows": [_loaded(each.arrows[side]) for side in SIDES],
+        "arrows": [
+            [None if np.isnan(arrow).any() else _rounded(arrow, 4) for arrow in each.arrows[side]]
+            for side in SIDES
+        ],
         "activation": _rounded(frames.activation, 3),
         "shapes": [
             {
@@ -169,11 +163,6 @@ def stride_data(each: Drawing) -> dict[str, Any]:
             for shape in each.shapes
         ],
     }
-
-
-def _loaded(arrows: np.ndarray) -> list[Any]:
-    """Return arrows as lists, None where there is none."""
-    return [None if np.isnan(arrow).any() else _rounded(arrow, 4) for arrow in arrows]
 
 
 def _rounded(values: np.ndarray, digits: int) -> list[Any]:

@@ -75,16 +75,16 @@ class Look:
 def shape_look(shape: Shape) -> Look:
     """Return the look of a shape; the colour of a muscle is that of activation 0."""
     left = shape.side == "left"
-    stroke = BODY_COLOUR[shape.side or "right"]
     width = _WIDTHS[shape.kind]
-    if shape.kind in ("recorded", "marker"):
-        if shape.kind == "marker":
-            return Look("#ffffff", width, False, SHADOW_COLOUR)
+    if shape.kind == "marker":
+        return Look("#ffffff", width, False, SHADOW_COLOUR)
+    if shape.kind == "recorded":
         return Look(SHADOW_COLOUR, width, left)
     if shape.kind in ("shell", "spring"):
         fill = SHELL_COLOUR if shape.kind == "shell" else "none"
         return Look(SPRING_COLOUR, width, left and shape.kind == "shell", fill, 0.45)
     fill = ACTIVATION_COLOURS[0] if shape.kind == "muscle" else "none"
+    stroke = BODY_COLOUR[shape.side or "right"]
     return Look(stroke, width, left and shape.kind in ("leg", "foot"), fill)
 
 

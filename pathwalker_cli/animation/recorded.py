@@ -37,12 +37,7 @@ class RecordedFrames:
 
 
 def recorded_frames(walker: Walker, trial: str, count: int) -> RecordedFrames:
-    """Return the first right gait cycle of a trial.
-
-    Args:
-        walker: The walker of the child, in the condition of the trial.
-        trial: A C3D file, or the name of a recording beside the patient.
-        count: Number of instants.
+    """Return the first right gait cycle of a C3D file, or of a recording, at `count` instants.
 
     Raises:
         DataError: If there is no such trial, it cannot be used, or shows no such cycle.
@@ -57,8 +52,7 @@ def recorded_frames(walker: Walker, trial: str, count: int) -> RecordedFrames:
     one, cycle, markers = cycles[0]
     share = np.arange(count) / count
     rows = cycle.start + (cycle.end - cycle.start) * share
-    bodies = [body_points(walker, q) for q in _at(one.motion.values, rows)]
-    points = {name: np.array([body[name] for body in bodies]) for name in bodies[0]}
+    points = body_paths(walker, _at(one.motion.values, rows))
     forward = one.motion.values[:, COORDINATES.index("pelvis_tx")]
     walked = share * (forward[cycle.end] - forward[cycle.start])
     eye = walked + float((points["hip_r"][:, 0] - walked).mean())
@@ -100,6 +94,12 @@ def _at(columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Return columns between their rows, shape (n, m) to (len(rows), m)."""
     known = np.arange(len(columns))
     return np.stack([np.interp(rows, known, column) for column in columns.T], axis=1)
+
+
+def body_paths(walker: Walker, poses: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the points of the body in poses (n, 10) [m], shape (n, 2) each."""
+    bodies = [body_points(walker, q) for q in poses]
+    return {name: np.array([body[name] for body in bodies]) for name in bodies[0]}
 
 
 def _before(eye: np.ndarray, path: np.ndarray) -> np.ndarray:

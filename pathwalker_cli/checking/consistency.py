@@ -60,12 +60,7 @@ def _length(patient: Patient, name: str) -> Iterator[str]:
 
 
 def odd_orthosis(orthosis: OrthosisData, prefix: str = "") -> Iterator[str]:
-    """Yield a sentence for each real spring that the range of the search leaves out.
-
-    Args:
-        orthosis: The orthosis.
-        prefix: What stands before its keys in the file.
-    """
+    """Yield a sentence for each real spring that the range of the search leaves out."""
     if orthosis.springs is None:
         return
     for kind in ("dorsiflexion", "plantarflexion"):
@@ -80,13 +75,7 @@ def odd_orthosis(orthosis: OrthosisData, prefix: str = "") -> Iterator[str]:
 
 
 def odd_speed(patient: Patient, speed: float, source: str) -> Iterator[str]:
-    """Yield a sentence about a speed at which nobody of this size walks.
-
-    Args:
-        patient: Who walks.
-        speed: Walking speed [m/s].
-        source: What asks for it.
-    """
+    """Yield a sentence about a speed [m/s], which `source` asks for and nobody so tall walks at."""
     leg = patient.leg_length
     froude = speed**2 / (GRAVITY * leg)
     if froude > _FROUDE:

@@ -54,7 +54,7 @@ def check_kinematics(path: str, changes: Changes = ()) -> Checked:
 
 def check_dynamics(path: str, changes: Changes = ()) -> Checked:
     """Return what `id` would do."""
-    config: InverseDynamicsConfig = load_inverse_dynamics(path, changes)
+    config = load_inverse_dynamics(path, changes)
     with placed(path):
         patient = load_patient(config.patient)
         require_trials(config, patient)
@@ -79,7 +79,7 @@ def check_markers(path: str, changes: Changes = ()) -> Checked:
         points = {c: marker_points(marker_set, patient, c) for c in CONDITIONS}
     rows: list[Row] = []
     for condition, own in points.items():
-        markers = list(dict.fromkeys(point.marker for point in own))
+        markers = dict.fromkeys(point.marker for point in own)
         text = f"{len(markers)} markers at {len(own)} points: {', '.join(markers)}"
         rows.append((condition, text))
     names = {c: sorted({point.marker for point in own}) for c, own in points.items()}
@@ -154,13 +154,7 @@ Check = Callable[[str, Changes], Checked]
 
 
 class Kind(NamedTuple):
-    """What a kind of file is read as, who checks it, and what takes it.
-
-    Args:
-        model: Model of its content.
-        check: Says what would be done with it.
-        taken_by: The command or key that it is for.
-    """
+    """What a kind of file is read as, who checks it, and the command or key that takes it."""
 
     model: type[BaseModel]
     check: Check
@@ -192,10 +186,8 @@ KINDS: Final[dict[str, Kind]] = {
 def check_file(path: str, problem: str = "", changes: Changes = ()) -> Checked:
     """Return what would be done with a file, after all checks that need no solve.
 
-    Args:
-        path: A file, the name of a shipped config, or a patient: id or folder.
-        problem: Problem that it must be of.
-        changes: Overrides "dotted.key=value" of a config.
+    It is a path, the name of a shipped config, or a patient; if a problem is named, it must be of
+    that.
 
     Raises:
         InputError: The first thing that is wrong.
@@ -213,12 +205,7 @@ def check_file(path: str, problem: str = "", changes: Changes = ()) -> Checked:
 
 
 def another_kind(path: str, kind: str) -> ConfigError | None:
-    """Return what to say of a file that is refused, if it is one of another kind; None if not.
-
-    Args:
-        path: A file, the name of a shipped config, or a patient.
-        kind: The kind that it is not accepted as.
-    """
+    """Return what to say of a file that is refused as a kind, if it is of another; None if not."""
     try:
         actual = _kind_of(path)
     except ConfigError:

@@ -30,11 +30,9 @@ from pathwalker_cli.studies.batch.cases import check_patient
 
 @dataclass(frozen=True)
 class Measured:
-    """One measured solve.
+    """Iterations of one measured solve, and its CPU seconds from the shell.
 
-    Args:
-        iterations: Iterations in all.
-        seconds: CPU seconds from the shell, imports, tables and figures included.
+    Imports, tables and figures are included.
     """
 
     iterations: int
@@ -67,13 +65,9 @@ _VERDICT: Final = 2.0
 
 @dataclass(frozen=True)
 class Seconds:
-    """CPU seconds on the machine of docs/performance.md.
+    """CPU seconds on the machine of docs/performance.md, with few and with many iterations too.
 
-    Args:
-        likely: As the shipped patient would take.
-        least: Few iterations.
-        most: Many iterations.
-        iterations: Iterations that `likely` stands for.
+    `likely` is what the shipped patient would take, in so many iterations.
     """
 
     likely: float
@@ -90,12 +84,9 @@ class Seconds:
 
 
 def expected(config: StudyConfig, intervals: int) -> Seconds:
-    """Return how long a solve may take.
+    """Return how long a solve may take that begins with so many intervals.
 
-    Args:
-        config: The study.
-        intervals: Intervals of its first mesh; unknowns, and seconds per iteration, are in
-            proportion to their collocation points.
+    Unknowns, and seconds per iteration, are in proportion to their collocation points.
     """
     refined = config.mesh.refinements > 0
     measured = MEASURED[config.problem][refined]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,8 +27,6 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
     Runs may be of any problems, conditions and patients; values of their configs that differ are
     listed. A run that did not converge is refused.
     """
-    from textwrap import fill
-
     from pathwalker_cli.errors import DataError
     from pathwalker_cli.report.compare import compare_runs, comparison_content, comparison_lines
 
@@ -41,8 +39,7 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
         print_json(comparison_content(comparison))
         return
     click.echo("\n".join(comparison_lines(comparison)))
-    for note in comparison.notes:
-        click.echo(fill(f"note: {note}", 80, subsequent_indent="      "))
+    _echo_notes(comparison.notes)
     if out is not None:
         click.echo(f"\nWritten to {out}")
 
@@ -113,8 +110,6 @@ def _write_evaluation(
 
 def _report(evaluations: Sequence[Evaluation], changes: Sequence[Change], out: Path) -> None:
     """Print the tables and what to know about them."""
-    from textwrap import fill
-
     from pathwalker_cli.evaluation.tables import change_lines, evaluation_lines, evaluation_notes
 
     for each in evaluations:
@@ -126,6 +121,12 @@ def _report(evaluations: Sequence[Evaluation], changes: Sequence[Change], out: P
         notes.append(
             "a change is shown from one barefoot run to one run with orthoses of the same patient"
         )
+    _echo_notes(notes)
+    click.echo(f"\nWritten to {out}")
+
+
+def _echo_notes(notes: Iterable[str]) -> None:
+    from textwrap import fill
+
     for note in notes:
         click.echo(fill(f"note: {note}", 80, subsequent_indent="      "))
-    click.echo(f"\nWritten to {out}")

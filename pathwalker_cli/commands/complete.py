@@ -41,7 +41,7 @@ def complete_configs(
     from pathwalker_cli.paths import shipped
 
     names = sorted(path.stem for path in shipped("configs").glob("*.yaml"))
-    return _items([*_paths(begun, (".yaml", ".yml")), *(n for n in names if n.startswith(begun))])
+    return _files_or(names, begun)
 
 
 def complete_patients(
@@ -51,7 +51,12 @@ def complete_patients(
     from pathwalker_cli.paths import shipped
 
     ids = sorted(path.parent.name for path in shipped("patient_data").glob("*/patient.yaml"))
-    return _items([*_paths(begun, (".yaml", ".yml")), *(n for n in ids if n.startswith(begun))])
+    return _files_or(ids, begun)
+
+
+def _files_or(names: Iterable[str], begun: str) -> list[CompletionItem]:
+    files = _paths(begun, (".yaml", ".yml"))
+    return _items([*files, *(name for name in names if name.startswith(begun))])
 
 
 def complete_runs(

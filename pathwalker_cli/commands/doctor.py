@@ -13,13 +13,9 @@ from pathwalker_cli.commands.options import json_option, print_json
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """One thing that was looked at, what was found, or what is missing and how to get it.
 
-    Args:
-        name: What it is.
-        ok: Whether it is in order.
-        needed: Whether nothing can be solved without it.
-        detail: What was found, or what is missing and how to get it.
+    Without what is needed nothing can be solved.
     """
 
     name: str
@@ -36,8 +32,7 @@ def doctor_command(context: click.Context, as_json: bool) -> None:
     all_findings = findings()
     usable = all(finding.ok for finding in all_findings if finding.needed)
     if as_json:
-        content = {"usable": usable, "findings": [asdict(finding) for finding in all_findings]}
-        print_json(content)
+        print_json({"usable": usable, "findings": [asdict(finding) for finding in all_findings]})
     else:
         for finding in all_findings:
             mark = "ok" if finding.ok else ("MISSING" if finding.needed else "-")

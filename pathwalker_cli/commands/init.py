@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from math import isnan, nan
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
@@ -113,7 +114,7 @@ def init_command(
     for origin in child.sources:
         click.echo(f"  {origin}")
     click.echo("\nNext:\n" if source else "Next:\n")
-    click.echo(f"{command_lines(f'cd {_quoted(folder)}', 2)}")
+    click.echo(command_lines(f"cd {quote(str(folder))}", 2))
     for number, step in enumerate(next_steps(seen, example, bool(walks)), start=1):
         click.echo(f"\n{click.wrap_text(f'{number}. {step.why}', 80, '# ', '# ')}")
         for command in step.commands:
@@ -176,10 +177,3 @@ def _safe(name: str) -> str:
     import re
 
     return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-_")[:64] or "child"
-
-
-def _quoted(folder: Path) -> str:
-    """Return a path as a shell takes it."""
-    import shlex
-
-    return shlex.quote(str(folder))

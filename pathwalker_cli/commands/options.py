@@ -23,14 +23,7 @@ quiet_option = click.option("--quiet", is_flag=True, help="Print errors only.")
 def out_option(
     text: str, *names: str, required: bool = False, metavar: str | None = "DIR"
 ) -> Decorator:
-    """Return what adds the option --out, a path, to a command.
-
-    Args:
-        text: What its help says.
-        names: Further names, e.g. "-o".
-        required: Whether it must be given.
-        metavar: What stands for its value in the help.
-    """
+    """Return what adds the option --out, a path, to a command."""
     kind = click.Path(path_type=Path)
     return click.option(*names, "--out", type=kind, required=required, metavar=metavar, help=text)
 
@@ -90,12 +83,7 @@ def print_failure(context: click.Context, sentence: str) -> None:
 
 @contextmanager
 def meant_as(kind: str, path: object) -> Iterator[None]:
-    """Say of a config that is refused, if so, that it is a file of another kind, and whose.
-
-    Args:
-        kind: Its kind in `checking.kinds.KINDS`.
-        path: The config, a file or the name of a shipped one.
-    """
+    """Say of a config that is refused, if so, that it is of another of `checking.kinds.KINDS`."""
     try:
         yield
     except ConfigError as error:

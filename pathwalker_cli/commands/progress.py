@@ -42,10 +42,7 @@ class _Lines:
 class Progress(RunLog):
     """Shows every iteration and every start of a solve, and keeps them.
 
-    Args:
-        quiet: Whether nothing shall be shown.
-        console: Where to show it; stderr if left out.
-        heading: Lines to show before the first iteration, once nothing was refused.
+    On stderr if no console is given; the heading comes first, once nothing was refused.
     """
 
     def __init__(
@@ -117,12 +114,7 @@ class Progress(RunLog):
 
 
 class BatchProgress(Watch):
-    """Shows how a study of many cases goes on.
-
-    Args:
-        quiet: Whether nothing shall be shown.
-        console: Where to show it; stderr if left out.
-    """
+    """Shows how a study of many cases goes on, on stderr if no console is given."""
 
     def __init__(self, quiet: bool = False, console: Console | None = None) -> None:
         self._lines = _Lines(quiet, console)

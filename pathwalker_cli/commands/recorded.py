@@ -172,11 +172,7 @@ def id_command(
 def _updated(patient: Patient, trials: Sequence[Trial], table: StrengthTable, method: str) -> str:
     """Put what was found into the patient's file; return a sentence about it."""
     from pathwalker_cli.inverse.files import strengths_source
-    from pathwalker_cli.inverse.recorded import (
-        recorded_blocks,
-        require_own_patient,
-        update_patient,
-    )
+    from pathwalker_cli.inverse.recorded import recorded_blocks, require_own_patient, update_patient
 
     path, blocks = require_own_patient(patient), recorded_blocks(patient, trials)
     update_patient(path, table.strengths, strengths_source(method), blocks)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,11 +50,8 @@ def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, qui
         if not quiet:
             click.echo(line)
 
-    def solve(case: Case, folder: Path) -> None:
-        _solve(case, folder, quiet)
-
     with claimed_folder(out, ENTRIES, "reproduce"):
-        results = reproduce(out, solve, say, starts, quick, c3d)
+        results = reproduce(out, partial(_solve, quiet=quiet), say, starts, quick, c3d)
     say(f"\nWritten to {out / PAGE}")
     if results.failed:
         raise NotConvergedError(

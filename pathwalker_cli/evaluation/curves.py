@@ -72,13 +72,7 @@ def traces(
     labels: Sequence[str],
     recorded: Sequence[RecordedGait | None] | None = None,
 ) -> tuple[Trace, ...]:
-    """Return several gaits that differ in colour and line style.
-
-    Args:
-        gaits: The gaits.
-        labels: Their names in the legend.
-        recorded: Recordings to draw behind each; none if left out.
-    """
+    """Return several gaits that differ in colour and line style."""
     behind = recorded or [None] * len(gaits)
     rows = zip(gaits, labels, behind, strict=True)
     return tuple(
@@ -101,13 +95,11 @@ def draw_cycle(ax: Axes, curve: CycleCurve, shown: Sequence[Trace], side: Side) 
     if curve.zero:
         style.zero_line(ax)
     for trace in shown:
-        if trace.recorded is not None:
-            cycles = trace.recorded.of("stride", side)
-            lines = [line for each in cycles for line in curve.lines(each, side, POINTS)]
-            _draw_range(ax, trace, np.array(lines))
+        if band := recorded_band(trace.recorded, curve, side):
+            _draw_range(ax, trace, band)
     percent = np.linspace(0.0, 100.0, FINE)
     for trace in shown:
-        look, toe_off = trace.look(side), _toe_off(trace.gait, side)
+        look, toe_off = trace.look(side), toe_off_percent(trace.gait, side)
         for line in curve.lines(trace.gait, side, FINE):
             ax.plot(percent, line, **look)
             if curve.least_in_stance:
@@ -131,16 +123,21 @@ def dress_cycle(ax: Axes, curve: CycleCurve, side: Side, label: bool) -> None:
     ax.locator_params(axis="y", nbins=4)
 
 
-def _draw_range(ax: Axes, trace: Trace, curves: np.ndarray) -> None:
+def recorded_band(recorded: RecordedGait | None, curve: CycleCurve, side: Side) -> Band | None:
+    """Return mean and range of the recorded cycles of a side, None without any."""
+    cycles = recorded.of("stride", side) if recorded else ()
+    lines = [line for each in cycles for line in curve.lines(each, side, POINTS)]
+    return Band.over(np.linspace(0.0, 100.0, POINTS), np.array(lines)) if lines else None
+
+
+def _draw_range(ax: Axes, trace: Trace, band: Band) -> None:
     """Draw recorded range and mean."""
-    if len(curves):
-        band = Band.over(np.linspace(0.0, 100.0, POINTS), curves)
-        ax.fill_between(band.percent, band.low, band.high, **trace.band)
-        for line in (band.mean,) if trace.order is None else (band.low, band.high):
-            ax.plot(band.percent, line, **trace.edge)
+    ax.fill_between(band.percent, band.low, band.high, **trace.band)
+    for line in (band.mean,) if trace.order is None else (band.low, band.high):
+        ax.plot(band.percent, line, **trace.edge)
 
 
-def _toe_off(gait: Stride, side: Side) -> float:
+def toe_off_percent(gait: Stride, side: Side) -> float:
     """Return the position of the toe-off in the gait cycle [%]."""
     strike, toe_off = gait.stance(side)
     return 100.0 * (toe_off - strike) / gait.duration

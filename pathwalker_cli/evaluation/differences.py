@@ -15,12 +15,8 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side
-from pathwalker_cli.evaluation.recorded import (
-    RecordedGait,
-    Spread,
-    left_toe_off_stride,
-    spread,
-)
+from pathwalker_cli.evaluation.norms import sides_shown
+from pathwalker_cli.evaluation.recorded import RecordedGait, Spread, left_toe_off_stride, spread
 from pathwalker_cli.stride.measure import CYCLE, FORCE, TRIAL, Measure
 from pathwalker_cli.stride.stride import POINTS, Part, Stride
 
@@ -91,14 +87,10 @@ def recorded_rms_one_trial(recorded: RecordedGait, reference: Stride) -> dict[st
 def rms_mean_cycle(stride: Stride, recorded: RecordedGait) -> dict[str, float]:
     """Return the RMS difference to the mean recorded gait cycle [rad], by joint.
 
-    Over the per cent of the gait cycle of each side, right and left pooled.
-
-    Args:
-        stride: The stride; of a recorded one its own side counts.
-        recorded: The recordings, with complete cycles of both sides.
+    Over the per cent of the gait cycle of each side that the stride shows, right and left pooled.
     """
     errors: dict[str, list[np.ndarray]] = {}
-    for side in _sides(stride):
+    for side in sides_shown(stride):
         cycles = [cycle.over_cycle(cycle.q, side) for cycle in recorded.of("stride", side)]
         difference = stride.over_cycle(stride.q, side) - np.mean(cycles, axis=0)
         for joint, names in JOINTS.items():
@@ -110,8 +102,7 @@ def rms_mean_cycle(stride: Stride, recorded: RecordedGait) -> dict[str, float]:
 
 def recorded_rms_mean_cycle(recorded: RecordedGait) -> dict[str, Spread]:
     """Return the RMS difference of single recorded cycles to their mean [rad], by joint."""
-    cycles = (cycle for side in SIDES for cycle in recorded.of("stride", side))
-    return _spreads(rms_mean_cycle(cycle, recorded) for cycle in cycles)
+    return _spreads(rms_mean_cycle(cycle, recorded) for cycle in recorded.cycles)
 
 
 def force_rms(stride: Stride, recorded: RecordedGait) -> dict[str, float]:
@@ -140,10 +131,6 @@ def recorded_force_rms(recorded: RecordedGait) -> dict[str, Spread]:
             if len(curves) > 1:
                 single[key] += [_rms(curve - curves.mean(axis=0)) for curve in curves]
     return {key: each for key, values in single.items() if (each := spread(values))}
-
-
-def _sides(stride: Stride) -> tuple[Side, ...]:
-    return SIDES if stride.side is None else (stride.side,)
 
 
 def _over(stride: Stride, span: Part, side: Side) -> np.ndarray:

@@ -123,10 +123,7 @@ class Evaluation:
         Raises:
             KeyError: If it was left out.
         """
-        found = self.find(key)
-        if found is None:
-            raise KeyError(key)
-        return found
+        return {row.measure.key: row for row in self.rows}[key]
 
     def find(self, key: str) -> Row | None:
         """Return the row of a measure, None if it was left out."""
@@ -136,13 +133,9 @@ class Evaluation:
 def evaluate_gait(
     gait: Stride, trial: str | None = None, recorded: RecordedGait | None = None
 ) -> Evaluation:
-    """Return a gait beside the recordings of its patient and condition.
+    """Return a gait beside recordings, those beside the patient's file if none are given.
 
-    Args:
-        gait: The gait.
-        trial: Trial to compare with at equal time; the article's, or the first that shows such a
-            stride, if left out.
-        recorded: The recordings; those beside the patient's file if left out.
+    At equal time it is compared with `trial`; see `reference_stride`.
 
     Raises:
         DataError: If a recording cannot be used, or the trial does not exist.

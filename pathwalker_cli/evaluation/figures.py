@@ -58,13 +58,7 @@ def ankle_figure(trace: Trace) -> Figure:
 
 
 def cycle_pairs(curves: Sequence[CycleCurve], shown: Sequence[Trace], head: float = 0.0) -> Figure:
-    """Return a figure with a row of right and left side per quantity.
-
-    Args:
-        curves: The quantities.
-        shown: The gaits.
-        head: Height to keep for a legend [in].
-    """
+    """Return a row of right and left side per quantity, below `head` [in] for a legend."""
     fig = style.new_figure(head + PAIR_HEIGHT * len(curves))
     panels = fig.subplots(len(curves), 2, sharey="row", squeeze=False)
     for row, curve in zip(panels, curves, strict=True):
@@ -75,12 +69,7 @@ def cycle_pairs(curves: Sequence[CycleCurve], shown: Sequence[Trace], head: floa
 
 
 def ankle_pair(shown: Sequence[Trace], head: float = 0.0) -> Figure:
-    """Return the net torque-angle profiles of both ankles.
-
-    Args:
-        shown: The gaits.
-        head: Height to keep for a legend [in].
-    """
+    """Return the net torque-angle profiles of both ankles, below `head` [in] for a legend."""
     fig = style.new_figure(head + ANKLE_HEIGHT)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
     for ax, side in zip(panels, SIDES, strict=True):

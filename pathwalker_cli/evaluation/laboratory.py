@@ -16,13 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from pathwalker_cli.conventions import SIDES, Side, to_degrees
-from pathwalker_cli.evaluation.curves import FINE, Trace
+from pathwalker_cli.evaluation.curves import FINE, Trace, recorded_band, toe_off_percent
 from pathwalker_cli.evaluation.norms import norms, speed_class
 from pathwalker_cli.evaluation.recorded import RecordedGait
 from pathwalker_cli.stride.figures import style
-from pathwalker_cli.stride.figures.curves import ANGLES, FORCES, MOMENTS, POWERS, Band, CycleCurve
+from pathwalker_cli.stride.figures.curves import ANGLES, FORCES, MOMENTS, POWERS, CycleCurve
 from pathwalker_cli.stride.measures import ankle_line
-from pathwalker_cli.stride.stride import POINTS
 
 _PELVIS, _HIP, _KNEE, _ANKLE, _TRUNK = ANGLES
 ROWS: Final = (
@@ -58,15 +57,17 @@ def cycle_panel(curve: CycleCurve, shown: Sequence[Trace]) -> Figure:
         percent = np.linspace(0.0, 100.0, typical.mean.size)
         low, high = typical.mean - typical.sd, typical.mean + typical.sd
         ax.fill_between(percent, low, high, color=_TYPICAL, linewidth=0)
+    behind = _behind(shown)
     for side in SIDES:
-        _draw_recorded(ax, curve, shown, side)
+        if band := recorded_band(behind[1] if behind else None, curve, side):
+            ax.fill_between(band.percent, band.low, band.high, color=style.LINE_COLOUR[side],
+                            alpha=_RECORDED, linewidth=0)  # fmt: skip
     for trace in shown:
         for side in SIDES:
             look = _look(shown, trace, side)
             for line in curve.lines(trace.gait, side, FINE):
                 ax.plot(np.linspace(0.0, 100.0, FINE), line, **look)
-            strike, toe_off = trace.gait.stance(side)
-            at = 100.0 * (toe_off - strike) / trace.gait.duration
+            at = toe_off_percent(trace.gait, side)
             tick = look | {"marker": "", "linewidth": 1.4}
             ax.plot([at, at], [0.0, _TICK], transform=ax.get_xaxis_transform(), **tick)
     style.percent_axis(ax, "")
@@ -151,14 +152,3 @@ def _look(shown: Sequence[Trace], trace: Trace, side: Side) -> dict[str, Any]:
         "linewidth": 1.1 if order == 0 else 0.9, "marker": style.MARKER[side], "markersize": 2.2,
         "markevery": (first, 75),
     }  # fmt: skip
-
-
-def _draw_recorded(ax: Axes, curve: CycleCurve, shown: Sequence[Trace], side: Side) -> None:
-    """Draw the range of recorded cycles of a side."""
-    behind = _behind(shown)
-    cycles = behind[1].of("stride", side) if behind else ()
-    lines = np.array([line for each in cycles for line in curve.lines(each, side, POINTS)])
-    if len(lines):
-        band = Band.over(np.linspace(0.0, 100.0, POINTS), lines)
-        ax.fill_between(band.percent, band.low, band.high, color=style.LINE_COLOUR[side],
-                        alpha=_RECORDED, linewidth=0)  # fmt: skip

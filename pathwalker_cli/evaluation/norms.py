@@ -41,11 +41,9 @@ QUANTITIES: Final = {
 
 @dataclass(frozen=True)
 class Norm:
-    """One quantity of typical children of a speed class.
+    """Mean and standard deviation between typical children of a speed class.
 
-    Args:
-        mean: Mean over the gait cycle, 51 points from 0 to 100 %, in the unit of the curve.
-        sd: Standard deviation between children, likewise.
+    Over the gait cycle, 51 points from 0 to 100 %, in the unit of the curve.
     """
 
     mean: np.ndarray
@@ -86,7 +84,7 @@ def _off(stride: Stride, side: Side) -> dict[str, tuple[np.ndarray, Norm]]:
     }
 
 
-def _sides(stride: Stride) -> tuple[Side, ...]:
+def sides_shown(stride: Stride) -> tuple[Side, ...]:
     """Return the sides whose cycles a stride shows: of a recorded one its own."""
     return SIDES if stride.side is None else (stride.side,)
 
@@ -97,7 +95,7 @@ def within_norms(stride: Stride, deviations: float = 2.0) -> dict[str, float]:
     At the speed of the stride, right and left pooled, by key of the curve; [1].
     """
     inside: dict[str, list[float]] = {}
-    for side in _sides(stride):
+    for side in sides_shown(stride):
         for key, (line, norm) in _off(stride, side).items():
             share = float(np.mean(np.abs(line) < deviations * norm.sd))
             inside.setdefault(key, []).append(share)
@@ -114,7 +112,7 @@ def _variable_score(stride: Stride, side: Side, key: str) -> float:
 
 def _profile_score(stride: Stride, side: Side | None = None) -> float:
     """Return the root mean square of the bars of one side, or of all that are known [rad]."""
-    sides = _sides(stride) if side is None else (side,)
+    sides = sides_shown(stride) if side is None else (side,)
     bars = [_variable_score(stride, each, angle.key) for each in sides for angle in _SAGITTAL]
     return float(np.sqrt(np.mean(np.square(bars))))
 

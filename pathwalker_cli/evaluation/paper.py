@@ -30,7 +30,7 @@ class PaperNumber:
     Args:
         subject: What it is about: a problem ("mapd-barefoot"), "recorded-barefoot" or
             "recorded-orthosis", "change" (from barefoot to orthosis), "patient" or "healthy".
-        quantity: Name of the quantity; those of a gait are the keys of `quantities.QUANTITIES`.
+        quantity: Name of the quantity; those of a gait are the keys of its measures.
         text: The digits as printed; the lower end of a range.
         unit: Unit as printed.
         place: Where in the article.
@@ -68,11 +68,7 @@ class PaperNumber:
         return float(10.0**-digits) * _TO_SI.get(self.unit, 1.0)
 
     def agrees(self, value: float) -> bool:
-        """Return whether a value in SI units, truncated or rounded, prints as this number.
-
-        Args:
-            value: The value; of a range it must lie inside.
-        """
+        """Return whether a value [SI], truncated or rounded, prints as this number or within it."""
         low, high = self.bounds
         rounding = 1e-9 * self.step
         if self.upper:
@@ -83,12 +79,9 @@ class PaperNumber:
 
 @dataclass(frozen=True)
 class PaperClaim:
-    """A change from barefoot to orthosis that the article states in words.
+    """A change from barefoot to orthosis that the article states in words, and where.
 
-    Args:
-        quantity: A key of `quantities.QUANTITIES`, without the side.
-        rises: Whether it is said to rise.
-        place: Where in the article.
+    The quantity is the key of a measure, without the side.
     """
 
     quantity: str
@@ -251,14 +244,7 @@ def _results() -> Iterator[PaperNumber]:
                       "of body weight, in earlier predictions")  # fmt: skip
 
 
-NUMBERS: Final = (
-    *_table_1(),
-    *_table_3(),
-    *_table_4(),
-    *_table_5(),
-    *_differences(),
-    *_results(),
-)
+NUMBERS: Final = (*_table_1(), *_table_3(), *_table_4(), *_table_5(), *_differences(), *_results())
 """Tables 1, 3, 4 and 5 and every number of the results section."""
 
 CLAIMS: Final = (

@@ -12,7 +12,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.evaluation.paper import PATIENT, REFERENCE_STRIDES
-from pathwalker_cli.inverse.cycles import GaitCycle, resampled, stances
+from pathwalker_cli.inverse.cycles import OTHER, GaitCycle, resampled, stances
 from pathwalker_cli.inverse.dynamics import frame_rate
 from pathwalker_cli.inverse.recorded import trial_steps
 from pathwalker_cli.inverse.strengths import stance_curves
@@ -57,11 +57,9 @@ def spread(values: Iterable[float]) -> Spread | None:
 
 @dataclass(frozen=True)
 class RecordedGait:
-    """All recordings of a patient in one condition.
+    """All recordings of a patient in the condition of its walker, which carries the weight.
 
-    Args:
-        walker: The patient's walker in that condition; it carries the weight.
-        trials: The trials with angles, events and, where measured, forces and torques.
+    Trials have angles, events and, where measured, forces and torques.
     """
 
     walker: Walker
@@ -101,13 +99,7 @@ class RecordedGait:
 
 
 def recorded_gait(walker: Walker) -> RecordedGait | None:
-    """Return the recordings of the patient in the walker's condition.
-
-    Args:
-        walker: The walker; its patient says where the recordings are.
-
-    Returns:
-        The recordings, or None if there are none.
+    """Return the recordings of the patient in the walker's condition, None if there are none.
 
     Raises:
         DataError: If a recording cannot be used.
@@ -125,11 +117,9 @@ def recorded_gait(walker: Walker) -> RecordedGait | None:
 def recorded_numbers(
     recorded: RecordedGait, measures: Iterable[Measure] | None = None
 ) -> dict[str, Spread]:
-    """Return mean and range of what recordings say, by key beside recordings, SI units.
+    """Return mean and range of what recordings say, by key, SI units.
 
-    Args:
-        recorded: The recordings.
-        measures: What to ask them; what `evaluate` compares if left out.
+    They are asked what `evaluate` compares if no measures are named.
     """
     spreads = {
         measure.key: spread(v for s in recorded.strides if (v := measure.of(s)) is not None)
@@ -174,8 +164,7 @@ def _cycle(walker: Walker, trial: Trial, cycle: GaitCycle, rate: float) -> Strid
         if e.side != side and start < e.frame < cycle.toe_off
     }
     if other.keys() == {"toe_off", "foot_strike"}:
-        away = next(s for s in SIDES if s != side)
-        spans[away] = other["foot_strike"] / rate, (other["toe_off"] + frames) / rate
+        spans[OTHER[side]] = other["foot_strike"] / rate, (other["toe_off"] + frames) / rate
     known: dict[str, Any] = {"side": side, "stances": spans, "time": np.arange(frames + 1) / rate}
     if trial.forces is not None:
         known["force"] = {side: _in_the_air_at_last(_forces(trial, side), cycle)}
@@ -225,10 +214,8 @@ def _forces(trial: Trial, side: Side) -> np.ndarray:
 def article_stride(recorded: RecordedGait, from_toe_off: bool = False) -> Stride | None:
     """Return the stride with which the article's programs compared, None for other recordings.
 
-    Args:
-        recorded: The recordings.
-        from_toe_off: Whether to begin at the left toe-off before it, if the recording gives one;
-            barefoot this is one frame earlier.
+    With `from_toe_off` it begins at the left toe-off before, if there is one; barefoot this is one
+    frame earlier.
     """
     walker = recorded.walker
     rows = REFERENCE_STRIDES[walker.condition]
@@ -243,14 +230,8 @@ def article_stride(recorded: RecordedGait, from_toe_off: bool = False) -> Stride
 def reference_stride(recorded: RecordedGait, name: str | None = None) -> Stride | None:
     """Return the recorded stride to compare with at equal time, from a left toe-off on.
 
-    For the patient of the article it is that of the article.
-
-    Args:
-        recorded: The recordings.
-        name: Name of the trial; the article's, or the first with such a stride, if left out.
-
-    Returns:
-        The stride, or None if no trial was named and none shows such a stride.
+    For the patient of the article it is that of the article, else that of the trial named, or the
+    first; None if no trial was named and none shows such a stride.
 
     Raises:
         DataError: If there is no such trial, or it shows no such stride.

@@ -82,12 +82,7 @@ def settings_of(dials: Sequence[Dial]) -> dict[str, float | None]:
 
 
 def case_at(base: Case, dials: Sequence[Dial], settings: Settings) -> Case:
-    """Return the case of a run with some dials turned.
-
-    Args:
-        base: The case of the run.
-        dials: Its dials.
-        settings: Where they stand; those that are missing stand where the run has them.
+    """Return the case of a run with some dials turned; others stand where the run has them.
 
     Raises:
         InputError: If config or patient refuse the numbers.

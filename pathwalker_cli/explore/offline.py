@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.explore.page import explore_page
 from pathwalker_cli.explore.picture import picture
 from pathwalker_cli.explore.session import Session
-from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.report.folders import studies_near
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.landscape import (
@@ -59,22 +57,14 @@ def _landscape(session: Session) -> dict[str, Any] | None:
 
     def state(i: int, j: int) -> dict[str, Any] | None:
         case = with_springs(run.case, springs, (k_d[i], k_p[j]))
-        ends = [end for name in _names(journal.folder, point_name(i, j))
-                if (end := journal.kept(name, case)) is not None and end.converged]  # fmt: skip
-        return picture(min(ends, key=_cost), session.dials) if ends else None
+        files = sorted(journal.folder.glob(f"{point_name(i, j)}.from.*.npz"))
+        ends = (journal.kept(file.name.removesuffix(".npz"), case) for file in files)
+        solved = [end for end in ends if end is not None and end.converged]
+        best = min(solved, key=lambda end: end.cost, default=None)
+        return None if best is None else picture(best, session.dials)
 
     return {
         "keys": [[unknown.address for unknown in unknowns] for unknowns in springs],
         "values": [k_d, k_p],
         "states": [[state(i, j) for j in range(len(k_p))] for i in range(len(k_d))],
     }
-
-
-def _names(folder: Path, point: str) -> Iterator[str]:
-    """Yield the names of all solves that were made for a point, or on the way to it."""
-    for path in sorted(folder.glob(f"{point}.from.*.npz")):
-        yield path.name.removesuffix(".npz")
-
-
-def _cost(end: Optimum) -> float:
-    return end.cost

@@ -25,28 +25,18 @@ SHADOW: Final = "the state before"
 
 
 def explore_page(session: Session, name: str, offline: Mapping[str, Any] | None = None) -> str:
-    """Return the page of a session.
-
-    Args:
-        session: The session, at the run itself.
-        name: What to call the run.
-        offline: What the page interpolates in, see `offline.states`; None if a server answers.
-    """
+    """Return the page of a session at the run itself; a server answers unless `offline` does."""
     drawn = drawing_of(session.optimum, name)
     view = common_view([drawn])
     view = replace(view, half_width=_ROOM * view.half_width, top=_ROOM * view.top)
-    return (
-        page_templates()
-        .get_template("explore/explore.html")
-        .render(
-            name=name,
-            who=who(drawn.frames),
-            groups=_groups(session.dials),
-            offline=offline is not None,
-            **walkers_content([drawn], view, SHADOW),
-            data=_data(session, name, view) | {"offline": offline},
-        )
-    )
+    return page_templates().get_template("explore/explore.html").render(
+        name=name,
+        who=who(drawn.frames),
+        groups=_groups(session.dials),
+        offline=offline is not None,
+        **walkers_content([drawn], view, SHADOW),
+        data=_data(session, name, view) | {"offline": offline},
+    )  # fmt: skip
 
 
 def _data(session: Session, name: str, view: View) -> dict[str, Any]:

@@ -10,13 +10,14 @@ import numpy as np
 from pathwalker_cli.animation.drawing import Drawing, drawing
 from pathwalker_cli.animation.frames import gait_frames
 from pathwalker_cli.animation.html import stride_data
-from pathwalker_cli.conventions import SIDES, Side
+from pathwalker_cli.conventions import SIDES
+from pathwalker_cli.evaluation.curves import toe_off_percent
 from pathwalker_cli.explore.dials import Dial
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.stride.figures.curves import ANGLES, FORCES, MOMENTS, CycleCurve
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measures_in
-from pathwalker_cli.stride.stride import Stride, stride_of
+from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.studies.measures import all_measures
 
 INSTANTS: Final = 60
@@ -43,13 +44,7 @@ def drawing_of(optimum: Optimum, name: str) -> Drawing:
 
 
 def picture(optimum: Optimum, dials: Sequence[Dial], name: str = "") -> dict[str, Any]:
-    """Return what is seen of an optimum, solved or extrapolated.
-
-    Args:
-        optimum: The optimum.
-        dials: The dials, whose values it tells.
-        name: What to call it.
-    """
+    """Return what is seen of an optimum, solved or extrapolated, and where the dials stand."""
     stride, values = stride_of(optimum.series), all_measures(optimum)
     held = {dial.unknown: dial.key for dial in dials if dial.unknown}
     return {
@@ -62,7 +57,7 @@ def picture(optimum: Optimum, dials: Sequence[Dial], name: str = "") -> dict[str
             ]
             for curve in CURVES
         },
-        "toe_off": [_toe_off(stride, side) for side in SIDES],
+        "toe_off": [toe_off_percent(stride, side) for side in SIDES],
         "values": {
             measure.key: measure.in_shown_unit(value)
             for measure in numbers_shown()
@@ -70,9 +65,3 @@ def picture(optimum: Optimum, dials: Sequence[Dial], name: str = "") -> dict[str
         },
         "found": {key: optimum.value(unknown) for unknown, key in held.items()},
     }
-
-
-def _toe_off(stride: Stride, side: Side) -> float:
-    """Return when the toe leaves the ground, in per cent of the cycle of its side."""
-    strike, toe_off = stride.stance(side)
-    return 100.0 * (toe_off - strike) / stride.duration

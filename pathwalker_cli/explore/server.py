@@ -71,13 +71,7 @@ async def serve(
 
 
 class Desk:
-    """Stands between pages and the solver.
-
-    Args:
-        connection: To the solver.
-        places: The folder in which settings are saved.
-        grace: See `serve`.
-    """
+    """Stands between pages and the solver; see `serve`."""
 
     def __init__(self, connection: Connection, places: Path, grace: float) -> None:
         self._connection, self._places, self._grace = connection, places, grace

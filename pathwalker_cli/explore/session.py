@@ -23,11 +23,9 @@ _STEP: Final = 1e-4
 
 
 class Session:
-    """The optimum that is looked at, and those around it.
+    """The optimum of a run that is looked at, and those around it.
 
-    Args:
-        run: The run.
-        observer: Hears every iteration, and may end a solve.
+    The observer hears every iteration, and may end a solve.
 
     Raises:
         NotConvergedError: If the run cannot be solved again.
@@ -78,11 +76,7 @@ class Session:
         return extrapolated(self.optimum, below, above, _STEP, there)
 
     def solve(self, settings: Settings, start: Optimum | None = None) -> Optimum:
-        """Solve the problem with other settings and go there; if that fails, stay.
-
-        Args:
-            settings: Where the dials stand.
-            start: The same extrapolated, to begin with.
+        """Solve the problem with other settings, from `start`, and go there; if that fails, stay.
 
         Raises:
             InputError: If config or patient refuse the numbers.

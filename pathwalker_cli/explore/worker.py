@@ -15,7 +15,7 @@ from typing import Any, Final
 from pathwalker_cli.errors import InputError, NotConvergedError, PathwalkerError
 from pathwalker_cli.explore.page import explore_page
 from pathwalker_cli.explore.picture import picture
-from pathwalker_cli.explore.session import Session
+from pathwalker_cli.explore.session import STOPPED, Session
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.processes import prepare_worker
 from pathwalker_cli.nlp.watch import ProgressReport
@@ -28,13 +28,7 @@ Message = Mapping[str, Any]
 
 
 def serve_moves(connection: Connection, folder: Path, places: Path) -> None:
-    """Answer moves and saves until nobody asks any more.
-
-    Args:
-        connection: Where messages come from and answers go.
-        folder: The folder of the run.
-        places: The folder in which settings are saved.
-    """
+    """Answer moves of a run, and save settings below `places`, until nobody asks any more."""
     prepare_worker()
     try:
         Worker(connection, folder, places).run()
@@ -100,7 +94,7 @@ class Worker:
         end = self._session.solve(settings, guess)
         if end.converged:
             self._send("solved", message, end, seconds=time.perf_counter() - began)
-        elif not self._interrupted(end):
+        elif end.result.status != STOPPED:
             raise NotConvergedError(
                 f"no walk was found there ({end.result.status}); what is shown is the one before: "
                 "move there in smaller steps"
@@ -128,10 +122,6 @@ class Worker:
             {"kind": "saved", "number": message["number"], "folder": str(folder),
              "shown": shown, "cost": solution.cost}
         )  # fmt: skip
-
-    @staticmethod
-    def _interrupted(end: Optimum) -> bool:
-        return end.result.status == "stopped by the user"
 
     def _send(self, kind: str, move: Message, optimum: Optimum, **more: Any) -> None:
         shown = picture(optimum, self._session.dials)

@@ -18,12 +18,7 @@ import numpy as np
 from pathwalker_cli.conventions import GRAVITY, SIDES, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.joint_centres import LEFTWARD, beside_joint, hip_centre
-from pathwalker_cli.inverse.marker_sets import (
-    KnownSet,
-    foot_places,
-    recognised,
-    set_points,
-)
+from pathwalker_cli.inverse.marker_sets import KnownSet, foot_places, recognised, set_points
 from pathwalker_cli.inverse.walk import about_vertical, turned, upright
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.c3d_checks import check_markers, readable_recording
@@ -129,11 +124,7 @@ def _facing(recording: Recording, known: KnownSet) -> Recording:
 
 
 def _told(
-    recording: Recording,
-    names: tuple[str, ...],
-    value: float | None,
-    what: str,
-    sources: list[str],
+    recording: Recording, names: tuple[str, ...], value: float | None, what: str, sources: list[str]
 ) -> float | None:
     """Return a number that was given, else the one of the file; note where it comes from."""
     if value is not None:

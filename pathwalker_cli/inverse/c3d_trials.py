@@ -15,12 +15,7 @@ from pathwalker_cli.inverse.forces import foot_extents, ground_forces, plate_loa
 from pathwalker_cli.inverse.found_events import events_of_motion, set_by_plates
 from pathwalker_cli.inverse.joint_centres import legs_in_plane
 from pathwalker_cli.inverse.marker_sets import KnownSet, leg_length, recognised, set_points
-from pathwalker_cli.inverse.markers import (
-    MarkerPoint,
-    bridge_gaps,
-    load_marker_set,
-    marker_points,
-)
+from pathwalker_cli.inverse.markers import MarkerPoint, bridge_gaps, load_marker_set, marker_points
 from pathwalker_cli.inverse.misplaced import robust_kinematics
 from pathwalker_cli.inverse.study import RecordedConfig
 from pathwalker_cli.inverse.trial import Trial
@@ -42,15 +37,7 @@ def c3d_trials(
 ) -> list[tuple[Trial, Recording]]:
     """Evaluate one C3D file: angles, events and, with force plates, forces, but no torques.
 
-    Args:
-        path: The file.
-        patient: The patient.
-        condition: What was worn.
-        config: What was chosen.
-        taken: Names of other recordings, which no pass takes.
-
-    Returns:
-        A trial for every pass, each with the recording as the file holds it.
+    No pass takes a name in `taken`.  Each trial comes with the recording as the file holds it.
 
     Raises:
         StandingError: If nobody walks.
@@ -126,11 +113,7 @@ def _walk_trial(
         markers=distances,
         gaps=gaps,
         walk=walk,
-        doubts=(
-            *orientation_doubts(walk, points),
-            *doubts,
-            *(forces.remarks if forces else ()),
-        ),
+        doubts=(*orientation_doubts(walk, points), *doubts, *(forces.remarks if forces else ())),
     )
 
 

@@ -25,13 +25,7 @@ FLAT: Final = (0.1, 0.25)
 
 @dataclass(frozen=True)
 class Stance:
-    """A foot on the ground.
-
-    Args:
-        side: "right" or "left".
-        strike: Frame of the foot strike.
-        toe_off: Frame of the toe-off.
-    """
+    """A foot on the ground, from the frame of its strike to that of its toe-off."""
 
     side: Side
     strike: int
@@ -45,13 +39,9 @@ class Stance:
 
 @dataclass(frozen=True)
 class GaitCycle:
-    """A stride: from a foot strike to the next one of the same foot.
+    """A stride: from a foot strike to the next one of the same foot, with the toe-off in between.
 
-    Args:
-        side: "right" or "left".
-        start: Frame of the first strike.
-        toe_off: Frame of the toe-off in between.
-        end: Frame of the next strike.
+    All three are frames.
     """
 
     side: Side
@@ -113,7 +103,7 @@ def single_support(stance: Stance, events: Sequence[Event]) -> np.ndarray:
 def step_lengths(
     events: tuple[Event, ...], heels: Mapping[Side, np.ndarray], rate: float
 ) -> dict[Side, tuple[float, ...]]:
-    """Return the lengths of the steps of each side.
+    """Return the lengths of the steps of each side [m].
 
     A step reaches from the other foot's heel to the stepping foot's, each taken while its foot
     stands flat, which is a tenth to a quarter of a second after its strike.
@@ -122,9 +112,6 @@ def step_lengths(
         events: Foot strikes and toe-offs.
         heels: Per side, forward position of the heel [m], shape (n,).
         rate: Frames per second [1/s].
-
-    Returns:
-        Per side, lengths of its steps [m].
     """
     strikes = [event for event in events if event.kind == "foot_strike"]
     lengths: dict[Side, list[float]] = {side: [] for side in SIDES}
@@ -150,11 +137,7 @@ def walking_speed(motion: Trajectory) -> float:
 def joint_ranges(
     motions: Sequence[tuple[Trajectory, tuple[GaitCycle, ...]]],
 ) -> dict[str, tuple[float, float]]:
-    """Return the lowest and highest angle [rad] of every joint over gait cycles.
-
-    Args:
-        motions: Motions of several trials with their cycles.
-    """
+    """Return the lowest and highest angle [rad] of every joint over gait cycles."""
     ranges = {}
     for name in ANGLES:
         parts = [motion[name][cycle.rows] for motion, cycles in motions for cycle in cycles]
@@ -194,11 +177,7 @@ def resampled(columns: np.ndarray) -> np.ndarray:
 
 
 def cycle_band(trials: Sequence[tuple[Trajectory, tuple[GaitCycle, ...]]], side: Side) -> CycleBand:
-    """Return mean and spread of curves over the gait cycles of one side.
-
-    Args:
-        trials: Curves of several trials, NaN where not measured, with their gait cycles.
-        side: Side whose strike starts the cycle.
+    """Return mean and spread of curves, NaN where not measured, over the gait cycles of one side.
 
     Raises:
         DataError: If the trials show no complete cycle of that side.

@@ -45,9 +45,7 @@ def smooth_rates(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return filtered values with their first and second derivatives, each of shape (n, m).
 
-    Args:
-        motion: Evenly sampled motion.
-        cutoff: Cut-off frequency [Hz].
+    The motion is evenly sampled; the cut-off frequency is in Hz.
     """
     smooth = low_pass(motion.values, frame_rate(motion), cutoff)
     spline = CubicSpline(motion.time, smooth, axis=0)

@@ -76,12 +76,7 @@ def joint_angle_figure(trials: Sequence[Trial]) -> Figure:
 
     Flexion, dorsiflexion and forward lean are positive, as gait laboratories plot them.
     """
-    bands = _bands(trials, lambda trial: trial.motion)
-    fig = new_figure(3.9)
-    panels = fig.subplots(3, 2).ravel()
-    _draw(panels, bands, _ANGLES)
-    legend_panel(panels[-1], _handles(bands, "hip_{}", "stride"))
-    return fig
+    return _joint_figure(_bands(trials, lambda trial: trial.motion), _ANGLES, 3.9, "stride")
 
 
 def joint_torque_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
@@ -91,11 +86,7 @@ def joint_torque_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
     measured force count.
     """
     bands = _bands(trials, lambda trial: trial.tau, measured=True)
-    fig = new_figure(2.9)
-    panels = fig.subplots(2, 2).ravel()
-    _draw(panels, bands, _TORQUES, body_mass)
-    legend_panel(panels[-1], _handles(bands, "hip_{}", "measured stride"))
-    return fig
+    return _joint_figure(bands, _TORQUES, 2.9, "measured stride", body_mass)
 
 
 def ground_force_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
@@ -108,11 +99,7 @@ def ground_force_figure(trials: Sequence[Trial], body_mass: float) -> Figure:
 
 
 def marker_figure(trials: Sequence[Trial]) -> Figure:
-    """Return the distance between every marker and the walker, mean and range over trials.
-
-    Args:
-        trials: Trials of one condition from C3D files.
-    """
+    """Return the distance between every marker and the walker, mean and range over C3D trials."""
     each = [trial.markers.rms() for trial in trials if trial.markers is not None]
     rms = {name: 1e3 * np.array([trial[name] for trial in each]) for name in each[0]}
     rms = {name: values for name, values in rms.items() if np.isfinite(values).any()}
@@ -145,11 +132,7 @@ def save_recorded_figures(
 ) -> tuple[str, ...]:
     """Save the figures that the trials of one condition allow; return the file names.
 
-    Args:
-        trials: Trials of one condition.
-        folder: Where; it must exist.
-        body_mass: Mass of the patient [kg].
-        formats: "png", "svg" or both.
+    Torques and forces are shown over `body_mass` [kg].
     """
     makers: dict[str, Callable[[], Figure]] = {}
     if any(trial.cycles for trial in trials):
@@ -171,12 +154,7 @@ def save_recorded_figures(
 def recorded_reference(patient: Patient, condition: Condition) -> Reference | None:
     """Return recorded joint angles as bands to draw behind those of a prediction.
 
-    Args:
-        patient: The patient.
-        condition: Condition of the recordings beside the patient's file.
-
-    Returns:
-        The bands, or None without usable recordings, which a prediction does not need.
+    None without usable recordings beside the patient's file: a prediction does not need them.
     """
     try:
         names = recording_names(patient, condition)
@@ -206,16 +184,11 @@ def name_figure(figure: Figure, words: str) -> None:
 
 
 def _bands(
-    trials: Sequence[Trial],
-    columns: Callable[[Trial], Trajectory | None],
-    measured: bool = False,
+    trials: Sequence[Trial], columns: Callable[[Trial], Trajectory | None], measured: bool = False
 ) -> Bands:
     """Return the bands of the sides of which the trials show a complete gait cycle.
 
-    Args:
-        trials: The trials.
-        columns: What to draw of a trial.
-        measured: Whether only cycles count whose stance has a measured force.
+    If `measured`, only cycles count whose stance has a measured force.
     """
     curves = []
     for trial in trials:
@@ -227,6 +200,17 @@ def _bands(
     if not seen:
         raise DataError("the trials show no complete gait cycle")
     return {side: cycle_band(curves, side) for side in SIDES if side in seen}
+
+
+def _joint_figure(
+    bands: Bands, panels: Panels, height: float, thing: str, per: float = 1.0
+) -> Figure:
+    """Return panels in two columns, so high [in], with the legend in the last place."""
+    fig = new_figure(height)
+    axes = fig.subplots(len(panels) // 2 + 1, 2).ravel()
+    _draw(axes, bands, panels, per)
+    legend_panel(axes[-1], _handles(bands, "hip_{}", thing))
+    return fig
 
 
 def _draw(axes: Iterable[Axes], bands: Bands, panels: Panels, per: float = 1.0) -> None:

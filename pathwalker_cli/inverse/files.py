@@ -44,11 +44,7 @@ _MARKERS: Final = ("point", "rms [m]", "largest [m]", "frames seen", "frames bri
 def write_kinematics(folder: Path, trials: Sequence[Trial], patient: Patient, limit: float) -> None:
     """Write trials and figures below a folder per condition, and the table of marker distances.
 
-    Args:
-        folder: Where; it must exist.
-        trials: The trials.
-        patient: The patient.
-        limit: Mean distance of the markers that is a warning, in body heights.
+    From `limit` on, a mean distance of the markers is a warning [body heights].
     """
     for condition in dict.fromkeys(trial.condition for trial in trials):
         own = [trial for trial in trials if trial.condition == condition]
@@ -68,16 +64,7 @@ def write_dynamics(
     patient: Patient,
     config: InverseDynamicsConfig,
 ) -> None:
-    """Write what `write_kinematics` writes, residuals, stances, strengths, and whose they are.
-
-    Args:
-        folder: Where; it must exist.
-        trials: The trials.
-        tables: Their residuals.
-        strengths: Strengths, written if there are any.
-        patient: The patient.
-        config: What was chosen.
-    """
+    """Write what `write_kinematics` writes, residuals, stances, strengths, and whose they are."""
     write_kinematics(folder, trials, patient, config.largest_marker_distance)
     _write_residuals(folder / "residuals.csv", tables)
     _write_stances(folder / "stances.csv", trials)
@@ -106,11 +93,7 @@ def strengths_source(method: str) -> str:
 def write_trial(folder: Path, trial: Trial, patient: Patient, limit: float) -> None:
     """Write one trial: angles, events, forces, torques and markers, as far as there are any.
 
-    Args:
-        folder: Where.
-        trial: The trial.
-        patient: The patient.
-        limit: Mean distance of the markers that is a warning, in body heights.
+    From `limit` on, a mean distance of the markers is a warning [body heights].
     """
     write_recording(folder, trial)
     stem = str(folder / trial.name)
@@ -128,12 +111,8 @@ def write_trial(folder: Path, trial: Trial, patient: Patient, limit: float) -> N
 def write_exchange(folder: Path, trial: Trial, body_mass: float) -> None:
     """Write what other programs read: .trc, plates as .mot, and a copy of the C3D file.
 
-    The copy holds our angles and, with torques, moments beside what the file has.
-
-    Args:
-        folder: Where.
-        trial: A trial that comes from C3D.
-        body_mass: Mass of the patient [kg].
+    The copy holds our angles and, with torques, moments per `body_mass` [kg] beside what the file
+    has.  Of a trial that comes from no C3D file nothing is written.
     """
     if trial.walk is None or trial.walk.source is None:
         return
@@ -210,13 +189,7 @@ def _write_strengths(path: Path, table: StrengthTable) -> None:
 
 
 def write_strengths_yaml(path: Path, strengths: Strengths, source: str) -> None:
-    """Write the block `strengths` as a patient's file takes it.
-
-    Args:
-        path: The file.
-        strengths: Maximum isometric torques [N m].
-        source: Where they come from, one line.
-    """
+    """Write strengths [N m] as a patient's file takes them, below a line about their source."""
     lines = [f"# Maximum isometric torques [N m]: {source}", "strengths:"]
     lines += strength_lines(strengths)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -80,7 +80,6 @@ def ground_forces(
     motion: Trajectory,
     aside: Mapping[Side, np.ndarray] | None = None,
     ahead: Mapping[Side, np.ndarray] | None = None,
-    cutoff: float = FORCE_CUTOFF,
     mend: bool = False,
 ) -> GroundForces:
     """Return the forces on both feet over the frames of a recording.
@@ -94,7 +93,6 @@ def ground_forces(
             which the loads lie under the feet.
         ahead: Per side, how far the foot stood ahead of the walker's [m], shape (n,); the centre of
             pressure is given where it is under the walker's foot.
-        cutoff: Cut-off frequency of the plates [Hz].
         mend: Whether to mend plates that are not stored as they stand.
 
     Raises:
@@ -105,10 +103,11 @@ def ground_forces(
     feet, direction = foot_extents(model, motion.values), "+x"
     if ahead is not None:
         feet = {side: ends + ahead[side][:, None] for side, ends in feet.items()}
-    loads = plate_loads(recording, cutoff)
+    loads = plate_loads(recording)
     if aside is None:
         direction = plate_direction(loads, feet, recording.events)
-        loads = _turned(recording, loads, direction)
+        axes = about_vertical(np.array(_HEADINGS[direction]))
+        loads = list(turned(replace(recording, plates=tuple(loads)), axes).plates)
     weight = GRAVITY * pin.computeTotalMass(model)
     prints = _footprints(model, feet, aside)
     faults = plate_faults(loads, stances(recording.events), prints, weight)
@@ -148,16 +147,8 @@ def plate_loads(recording: Recording, cutoff: float = FORCE_CUTOFF) -> list[Forc
     return loads
 
 
-def _turned(recording: Recording, loads: list[ForcePlate], direction: str) -> list[ForcePlate]:
-    """Return plates with x along a direction."""
-    axes = about_vertical(np.array(_HEADINGS[direction]))
-    return list(turned(replace(recording, plates=tuple(loads)), axes).plates)
-
-
 def _footprints(
-    model: pin.Model,
-    feet: Mapping[Side, np.ndarray],
-    aside: Mapping[Side, np.ndarray] | None,
+    model: pin.Model, feet: Mapping[Side, np.ndarray], aside: Mapping[Side, np.ndarray] | None
 ) -> dict[Side, Footprint]:
     """Return where both feet are on the ground, toes included."""
     neutral = foot_points(model, np.zeros((1, model.nq)))

@@ -42,11 +42,8 @@ LEFTWARD: Final[Mapping[Side, float]] = {"right": -1.0, "left": 1.0}
 def hip_centre(leg: float, width: float = 0.0) -> tuple[float, float, float]:
     """Return how far a hip joint is behind, beside and below the middle of the front spines [m].
 
-    Along the axes of the pelvis, by the regression of Davis et al. (1991).
-
-    Args:
-        leg: Length of the leg, spine to malleolus [m].
-        width: Distance between the front spines [m].
+    Along the axes of the pelvis, by the regression of Davis et al. (1991), for a leg [m] from spine
+    to malleolus and front spines that are `width` [m] apart.
     """
     size, depth = 0.115 * leg - 0.0153, 0.1288 * leg - 0.04856 + _MARKER
     theta, beta = np.radians(28.4), np.radians(18.0)

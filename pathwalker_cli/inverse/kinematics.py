@@ -57,9 +57,7 @@ class MarkerResiduals:
 
 
 def inverse_kinematics(
-    model: pin.Model,
-    recording: Recording,
-    points: tuple[MarkerPoint, ...],
+    model: pin.Model, recording: Recording, points: tuple[MarkerPoint, ...]
 ) -> tuple[Trajectory, MarkerResiduals]:
     """Fit the walker to the markers in every frame; nothing is filtered.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
@@ -51,14 +51,9 @@ class Difference:
     offset_free: float
 
 
-def angle_label(joint: str, side: Side) -> str:
-    """Return the name of an angle, e.g. LKneeAngles."""
-    return f"{side[0].upper()}{joint.capitalize()}Angles"
-
-
-def moment_label(joint: str, side: Side) -> str:
-    """Return the name of a moment, e.g. LKneeMoment."""
-    return f"{side[0].upper()}{joint.capitalize()}Moment"
+def _label(joint: str, side: Side, what: Literal["Angles", "Moment"]) -> str:
+    """Return the name of a curve, e.g. LKneeAngles."""
+    return f"{side[0].upper()}{joint.capitalize()}{what}"
 
 
 def angles(trial: Trial) -> dict[str, np.ndarray]:
@@ -68,7 +63,7 @@ def angles(trial: Trial) -> dict[str, np.ndarray]:
         for joint in ANGLES:
             name = "pelvis_tilt" if joint == "pelvis" else f"{joint}_{SUFFIX[side]}"
             values = CLINICAL_ANGLE.get(joint, 1.0) * trial.motion[name]
-            found[angle_label(joint, side)] = values
+            found[_label(joint, side, "Angles")] = values
     return found
 
 
@@ -77,23 +72,19 @@ def moments(trial: Trial, body_mass: float) -> dict[str, np.ndarray]:
     if trial.tau is None:
         return {}
     return {
-        moment_label(joint, side): EXTENSION[joint]
-        * trial.tau[f"{joint}_{SUFFIX[side]}"]
-        / body_mass
+        _label(joint, side, "Moment"):
+        EXTENSION[joint] * trial.tau[f"{joint}_{SUFFIX[side]}"] / body_mass
         for side in SIDES
         for joint in MOMENTS
-    }
+    }  # fmt: skip
 
 
 def differences(trial: Trial, body_mass: float) -> tuple[Difference, ...]:
     """Return ours minus what the file of a trial stores; nothing of what it does not.
 
     Angles count over the complete strides of their side, else over all frames; moments over the
-    stances that are measured and of which the laboratory's model knew the force too.
-
-    Args:
-        trial: The trial.
-        body_mass: Mass of the patient [kg].
+    stances that are measured and of which the laboratory's model knew the force too, per
+    `body_mass` [kg].
     """
     if trial.walk is None or not trial.walk.stored:
         return ()
@@ -105,7 +96,7 @@ def _angles(trial: Trial, theirs: Mapping[str, np.ndarray]) -> Iterator[Differen
     ours = angles(trial)
     for joint in ANGLES:
         for side in SIDES:
-            name = angle_label(joint, side)
+            name = _label(joint, side, "Angles")
             if name in theirs:
                 spans = [slice(c.start, c.end + 1) for c in trial.cycles if c.side == side]
                 off = np.degrees(ours[name] - theirs[name])
@@ -120,7 +111,7 @@ def _moments(
     absolute = any(np.nanmax(np.abs(theirs[name]), initial=0.0) > _PER_KG for name in there)
     mass = body_mass if absolute else 1.0
     for side in SIDES:
-        ankle = moment_label("ankle", side)
+        ankle = _label("ankle", side, "Moment")
         if ankle not in there:
             continue
         spans = [
@@ -131,7 +122,7 @@ def _moments(
             if _peak(theirs[ankle][span]) / mass > _LOADED * _peak(ours[ankle][span])
         ]
         for joint in MOMENTS:
-            name = moment_label(joint, side)
+            name = _label(joint, side, "Moment")
             if name in there and spans:
                 off = ours[name] - theirs[name] / mass
                 yield from _difference(f"{joint} moment", side, "N m/kg", off, spans)

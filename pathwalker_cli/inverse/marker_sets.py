@@ -88,11 +88,9 @@ on at one height."""
 
 @dataclass(frozen=True)
 class KnownSet:
-    """A marker set that was recognised.
+    """A marker set that was recognised: marker by landmark and side.
 
-    Args:
-        name: Its name.
-        markers: Marker by landmark and side; the middle ones stand on both sides.
+    Markers in the middle stand on both sides.
     """
 
     name: str

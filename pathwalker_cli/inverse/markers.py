@@ -124,13 +124,9 @@ def _position(entry: MarkerEntry, lengths: dict[str, float], scale: float) -> tu
 
 @dataclass(frozen=True)
 class Gap:
-    """A run of frames in which a marker was not seen.
+    """A run of frames in which a marker was not seen, and whether its path was interpolated there.
 
-    Args:
-        marker: Name of the marker.
-        first: First frame without it.
-        frames: Number of frames without it.
-        bridged: Whether the path was interpolated there.
+    `first` is the first frame without it, `frames` their number.
     """
 
     marker: str
@@ -142,15 +138,9 @@ class Gap:
 def bridge_gaps(
     recording: Recording, markers: tuple[str, ...], longest: float = LONGEST_GAP
 ) -> tuple[Recording, tuple[Gap, ...]]:
-    """Interpolate short gaps by monotone cubics; leave long ones and those at the ends.
+    """Interpolate gaps up to a length [s] by monotone cubics; leave those at the ends.
 
-    Args:
-        recording: The recording.
-        markers: Markers to look at.
-        longest: Longest gap that is bridged [s].
-
-    Returns:
-        The recording without the short gaps, and every gap that there was.
+    The recording comes back without them, and with it every gap that there was.
     """
     positions = recording.positions.copy()
     gaps: list[Gap] = []
@@ -162,7 +152,9 @@ def bridge_gaps(
             gaps.append(Gap(name, first, frames, bridged))
             if bridged:
                 rows = np.arange(first, first + frames)
-                positions[rows, recording.markers.index(name)] = _interpolated(path, rows)
+                seen = np.flatnonzero(np.isfinite(path[:, 0]))
+                curve = PchipInterpolator(seen, path[seen], axis=0)
+                positions[rows, recording.markers.index(name)] = curve(rows)
     positions.setflags(write=False)
     return replace(recording, positions=positions), tuple(gaps)
 
@@ -171,9 +163,3 @@ def _runs(missing: np.ndarray) -> list[tuple[int, int]]:
     """Return first frame and length of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], missing, [False]]).astype(int)))
     return [(int(a), int(b - a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _interpolated(path: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return the path at these rows from its seen frames."""
-    seen = np.flatnonzero(np.isfinite(path[:, 0]))
-    return np.asarray(PchipInterpolator(seen, path[seen], axis=0)(rows))

@@ -61,13 +61,7 @@ feet roll over at different times, and toes reach beyond the marker."""
 
 @dataclass(frozen=True)
 class Fault:
-    """One way in which a plate is not stored as it stands.
-
-    Args:
-        plate: Index of the plate.
-        what: What is wrong, in words.
-        mended: The plate as it would be right.
-    """
+    """One way in which the plate of an index is not stored as it stands, and the plate mended."""
 
     plate: int
     what: str

@@ -106,13 +106,9 @@ def update_patient(
     source: str,
     blocks: Mapping[Condition, tuple[Recorded, int]],
 ) -> None:
-    """Put strengths and ranges of recorded gait into a patient's file.
+    """Put strengths [N m] with their source, and `recorded_blocks`, into a patient's file.
 
-    Args:
-        path: The file.
-        strengths: Strengths [N m]; None to keep those that are there.
-        source: Where they come from, one line.
-        blocks: Ranges and number of trials by condition, from `recorded_blocks`.
+    Strengths that are None, and blocks of no condition, leave what is there.
     """
     text = path.read_text(encoding="utf-8")
     if strengths is not None:
@@ -160,12 +156,7 @@ def with_block(text: str, key: str, lines: Sequence[str]) -> str:
     """Return the text of a YAML file with a block in place of the one under a key.
 
     Comments above the key stay; those within the block go.  A block that is not there yet is
-    added at the end.
-
-    Args:
-        text: The text of the file.
-        key: The outermost key.
-        lines: The block, the key's line among them.
+    added at the end.  The key is an outermost one; its line is the first of `lines`.
     """
     old = text.splitlines()
     begin = next((i for i, line in enumerate(old) if re.match(rf"{key}\s*:", line)), None)

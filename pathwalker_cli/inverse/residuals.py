@@ -74,12 +74,9 @@ class ResidualTable:
 
 
 def residuals(trial: str, tau: np.ndarray, frames: np.ndarray | None = None) -> Residuals:
-    """Return the residuals of a trial over the frames in which they are known.
+    """Return the residuals of a trial over the frames, of all or of those given, that tell them.
 
-    Args:
-        trial: Name of the trial.
-        tau: Generalised forces [N, N m], NaN where a force is not measured, shape (n, 10).
-        frames: Frames to look at; all if left out.
+    `tau` holds generalised forces [N, N m], NaN where a force is not measured, shape (n, 10).
     """
     root = (tau if frames is None else tau[frames])[:, _ROOT]
     known = root[np.isfinite(root).all(axis=1)]
@@ -90,11 +87,9 @@ def residuals(trial: str, tau: np.ndarray, frames: np.ndarray | None = None) -> 
 
 
 def residual_range(trials: Sequence[Residuals], per: float = 1.0) -> ResidualRange:
-    """Return mean and extremes over trials that have any known frame.
+    """Return mean and extremes over trials that have any known frame, per mass [kg].
 
-    Args:
-        trials: Residuals of the trials.
-        per: Mass to divide by [kg]; the published table 3 gives N/kg and N m/kg as N and N m.
+    The published table 3 gives N/kg and N m/kg as N and N m.
     """
     means = np.array([item.mean for item in trials if item.frames]) / per
     return ResidualRange(means.mean(axis=0), means.min(axis=0), means.max(axis=0))
@@ -151,13 +146,9 @@ def _single_supports(trial: Trial, frames: int) -> dict[Side, np.ndarray]:
 def study_warnings(
     trials: Sequence[Trial], tables: Sequence[ResidualTable], patient: Patient, share: float
 ) -> tuple[str, ...]:
-    """Return a sentence for every condition whose vertical residual is far off.
+    """Return a sentence for every condition whose vertical residual exceeds a share of body weight.
 
-    Args:
-        trials: The trials; those of the published method carry no warning.
-        tables: Their residuals.
-        patient: The patient.
-        share: Share of body weight from which a residual is far off.
+    Trials of the published method carry no warning.
     """
     if any(trial.published for trial in trials):
         return ()

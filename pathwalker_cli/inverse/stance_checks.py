@@ -49,12 +49,9 @@ lengths: half the foot's breadth, and that much again for markers and corners.""
 
 @dataclass(frozen=True)
 class StanceForce:
-    """What the plates know about one stance.
+    """The index of the plate that carried a stance, or None, and why the stance is not measured.
 
-    Args:
-        stance: The stance.
-        plate: Index of the plate that carried it, or None.
-        reason: Why the stance is not measured, "" if it is.
+    The reason is "" if it is measured.
     """
 
     stance: Stance

@@ -93,13 +93,7 @@ class StrengthTable:
 def strength_table(
     trials: Sequence[Trial], patient: Patient, config: InverseDynamicsConfig
 ) -> StrengthTable:
-    """Return all strengths beside those of the patient's file.
-
-    Args:
-        trials: Trials of any condition; those with an orthosis are left out.
-        patient: The patient.
-        config: What counts as uncertain.
-    """
+    """Return all strengths by the barefoot trials, beside those of the patient's file."""
     barefoot = [t for t in trials if t.condition == "barefoot" and t.tau is not None]
     curves = stance_curves(barefoot, config.motion_cutoff, patient if config.tissue else None)
     peaks = extension_peaks(curves, any(trial.published for trial in barefoot))
@@ -161,12 +155,7 @@ def stance_curves(
 def extension_peaks(
     curves: Mapping[str, Sequence[np.ndarray]], published: bool = False
 ) -> tuple[Peak, ...]:
-    """Return the peaks of hip, knee and ankle extension in mean curves.
-
-    Args:
-        curves: Per coordinate, its torque, angle and speed, each of shape (POINTS, 3).
-        published: Whether means are smoothed as the published evaluation does.
-    """
+    """Return the peaks of extension in the means of `stance_curves`, smoothed if `published`."""
 
     def peak(generator: MuscleTorqueGenerator, every: Sequence[np.ndarray]) -> Peak:
         mean = np.mean(every, axis=0)
@@ -191,11 +180,7 @@ def isometric_torque(
 ) -> float:
     """Return tau_0 [N m] for which equation (1) gives this torque at an activation of 0.9.
 
-    Args:
-        generator: The muscle torque generator.
-        torque: Torque in its direction [N m].
-        angle: Joint angle [rad].
-        speed: Joint speed [rad/s].
+    Torque in the direction of the generator [N m], joint angle [rad] and speed [rad/s].
     """
     factor = float(generator.angle_factor(angle)) * float(generator.velocity_factor(speed))
     return torque / (ACTIVATION_AT_PEAK * factor)

@@ -116,11 +116,7 @@ def load_inverse_kinematics(
 
 
 def load_inverse_dynamics(path: str | Path, changes: tuple[str, ...] = ()) -> InverseDynamicsConfig:
-    """Read the config of an inverse dynamics study.
-
-    Args:
-        path: The YAML file, or the name of a shipped one.
-        changes: Overrides "dotted.key=value".
+    """Read a config, a file or a shipped name, with overrides "dotted.key=value".
 
     Raises:
         ConfigError: If file or overrides are wrong, or source is c3d and no file is named.

@@ -37,13 +37,7 @@ def trials_renderable(trials: Iterable[Trial]) -> Table:
 
 
 def trial_content(trial: Trial, patient: Patient, limit: float) -> dict[str, Any]:
-    """Return what is known of a trial, as plain values.
-
-    Args:
-        trial: The trial.
-        patient: The patient.
-        limit: Mean distance of the markers that is a warning, in body heights.
-    """
+    """Return what is known of a trial, as plain values; see `warnings` for the limit."""
     return {
         "condition": trial.condition,
         "trial": trial.name,
@@ -144,10 +138,7 @@ def _table(
 def warnings(trial: Trial, height: float, share: float) -> tuple[str, ...]:
     """Return a sentence for everything about a trial that may be wrong.
 
-    Args:
-        trial: The trial.
-        height: Height of the patient [m].
-        share: Mean distance of the markers that is a warning, as a share of the height.
+    Markers are too far away from a share of the patient's height [m] on, on average.
     """
     found = list(trial.doubts)
     if trial.markers is not None and trial.markers.mean > share * height:

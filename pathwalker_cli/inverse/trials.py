@@ -157,12 +157,9 @@ def recorded_trials(
 def read_trials(
     folder: Path, condition: Condition, stances: Sequence[Mapping[str, str]]
 ) -> tuple[Trial, ...]:
-    """Return the trials of one condition as far as the files of an earlier study tell.
+    """Return the trials of one condition as far as the folder of an earlier study tells.
 
-    Args:
-        folder: Folder that `pathwalker id` wrote.
-        condition: The condition.
-        stances: Rows of its `stances.csv` by heading without unit.
+    Rows of its `stances.csv` go by heading without unit.
 
     Raises:
         DataError: If a file of a trial cannot be used.
@@ -196,12 +193,7 @@ def _trial(
 
 
 def with_torques(trial: Trial, patient: Patient, cutoff: float = MOTION_CUTOFF) -> Trial:
-    """Return a trial with its torques, if its forces are known.
-
-    Args:
-        trial: The trial.
-        patient: The patient.
-        cutoff: Cut-off frequency of the motion [Hz].
+    """Return a trial with its torques, its motion cut off at a frequency [Hz], if forces are known.
 
     Raises:
         DataError: If the frames are too few for the cut-off frequency.

@@ -105,12 +105,7 @@ def cut(recording: Recording, first: int, end: int) -> Recording:
 
 
 def turned(recording: Recording, axes: np.ndarray) -> Recording:
-    """Return a recording in other axes, markers and plates alike.
-
-    Args:
-        recording: The recording.
-        axes: The new axes in the old ones, one a row, shape (3, 3).
-    """
+    """Return a recording, plates too, in axes that are given in the old ones, a row each (3, 3)."""
     positions = recording.positions @ axes.T
     positions.setflags(write=False)
     plates = tuple(
@@ -141,12 +136,7 @@ def is_projected(recording: Recording, points: tuple[MarkerPoint, ...]) -> bool:
 
 
 def orientation_doubts(walk: Recording, points: tuple[MarkerPoint, ...]) -> tuple[str, ...]:
-    """Return what contradicts a pass along +x of a person who faces it, a sentence each.
-
-    Args:
-        walk: A pass in the walking plane.
-        points: Where its markers sit.
-    """
+    """Return what contradicts a pass along +x of a person who faces it, a sentence each."""
     places = np.nanmean(_positions(walk, points), axis=0)
     doubts = []
     front = [i for i, p in enumerate(points) if p.link == "pelvis" and p.position[0] > 0.0]

@@ -167,11 +167,8 @@ class Patient(YamlModel):
     def number(self, address: str, default: float | None = None) -> float:
         """Return the number at a place in the file, e.g. "orthosis.neutral_angle.right".
 
-        What has no key of its own stands under its whole address in `numbers`.
-
-        Args:
-            address: The place, the side last where there is one.
-            default: What counts where the file gives none.
+        What has no key of its own stands under its whole address in `numbers`.  The default counts
+        where the file gives none.
 
         Raises:
             PatientError: If the file gives none there, and there is no default.
@@ -194,11 +191,9 @@ class Patient(YamlModel):
         return float(holder)
 
     def length(self, name: str, side: str | None = None) -> float:
-        """Return a segment length or joint offset [m], measured or from proportions.
+        """Return a length of `SegmentLengths` [m], measured or from proportions.
 
-        Args:
-            name: A field of `SegmentLengths`.
-            side: "right" or "left" for what exists twice.
+        The side matters for what exists twice.
         """
         given = getattr(self.segment_lengths, name)
         if given is None:
@@ -321,12 +316,8 @@ def healthy_child() -> Patient:
 def healthy_strength(name: str, body_mass: float, height: float) -> float:
     """Return a maximum isometric torque of a healthy child, the shipped one grown or shrunk [N m].
 
-    A torque is a force, which grows with body mass, times a lever, which grows with height.
-
-    Args:
-        name: Field of `Strengths`, e.g. "hip_extension".
-        body_mass: Body mass of the child [kg].
-        height: Height of the child [m].
+    A torque is a force, which grows with body mass [kg], times a lever, which grows with height
+    [m].  The name is a field of `Strengths`.
     """
     child, same = healthy_child(), f"strengths.{name}.right"
     return child.number(same) * (body_mass * height) / (child.body_mass * child.height)

@@ -55,12 +55,8 @@ def varied(
 ) -> Patient:
     """Return a patient with some numbers changed.
 
-    Lengths that the file leaves to body proportions are filled in before they are changed.
-
-    Args:
-        patient: The patient.
-        variation: Factors and shifts.
-        numbers: Named numbers that count instead of the file's, by address; they come first.
+    Lengths that the file leaves to body proportions are filled in before they are changed; named
+    numbers, by address, come first.
 
     Raises:
         ConfigError: If a place does not exist or holds no number.

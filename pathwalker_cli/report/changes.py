@@ -86,19 +86,14 @@ def outcomes(runs: Sequence[ReportRun]) -> tuple[Outcome, ...]:
                     for run, row in zip(runs, rows, strict=True)
                     if row is not None and row.recorded is not None
                 }
-                held = tuple(_is_held(run, key) for run in runs)
+                held = tuple(any(_holds(b, key) for b in run.run.result.bounds) for run in runs)
                 measure = next(row.measure for row in rows if row is not None)
                 found.append(Outcome(measure, more, tuple(values), recorded, held))
     return tuple(found)
 
 
-def _is_held(run: ReportRun, key: str) -> bool:
-    """Return whether a bound of the config holds a measure, so that it was not predicted."""
-    return any(_holds(bound, key) for bound in run.run.result.bounds)
-
-
 def _holds(bound: ActiveBound, key: str) -> bool:
-    """Return whether a bound is one of the measure itself."""
+    """Return whether a bound is one of the measure itself, which then was not predicted."""
     knees = {f"knee_{SUFFIX[side]}": f"min_stance_knee_flexion_{side}" for side in SIDES}
     return key == (knees.get(bound.name) if bound.side == "lower" else None) or key == bound.name
 

@@ -78,12 +78,9 @@ class Compared:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Several runs side by side.
+    """Several runs, of which the first is the base, side by side.
 
-    Args:
-        gaits: Their gaits under names that differ; the first is the base.
-        rows: Metrics that some run has.
-        config: Keys of the configs whose values differ, with the value of each run.
+    `config` holds the keys of the configs whose values differ, with the value of each run.
     """
 
     gaits: tuple[Stride, ...]
@@ -224,7 +221,11 @@ def write_comparison_csv(path: Path, found: Comparison) -> None:
 def comparison_content(found: Comparison) -> dict[str, Any]:
     """Return everything that was compared, ready for JSON; SI units, shares of 1."""
     return {
-        "runs": [_about(gait) for gait in found.gaits],
+        "runs": [
+            {"name": gait.name, "problem": gait.problem, "patient": gait.walker.patient.id,
+             "condition": gait.walker.condition}
+            for gait in found.gaits
+        ],
         "base": found.names[0],
         "metrics": {
             row.measure.key: {
@@ -239,10 +240,4 @@ def comparison_content(found: Comparison) -> dict[str, Any]:
             key: dict(zip(found.names, values, strict=True)) for key, values in found.config.items()
         },
         "notes": list(found.notes),
-    }
-
-
-def _about(gait: Stride) -> dict[str, str]:
-    walker = gait.walker
-    return {"name": gait.name, "problem": gait.problem, "patient": walker.patient.id,
-            "condition": walker.condition}  # fmt: skip
+    }  # fmt: skip

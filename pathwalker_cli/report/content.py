@@ -93,14 +93,7 @@ class Drawing:
 class Section:
     """A part of a page; what it does not have is left out.
 
-    Args:
-        title: Its heading.
-        lines: Sentences.
-        facts: Labels and what they say.
-        tables: Its tables.
-        points: A list of sentences.
-        drawings: Its figures.
-        new_page: Whether it begins a new page in print.
+    `lines` and `points` are sentences, the latter a list; `new_page` is about print.
     """
 
     title: str
@@ -114,14 +107,9 @@ class Section:
 
 @dataclass(frozen=True)
 class Page:
-    """A page.
+    """A page: what its head says (who, when, what), the answer, and its parts in order.
 
-    Args:
-        title: Its title.
-        facts: What its head says: who, when, what.
-        answer: The answer in plain sentences.
-        warnings: What must be known before the answer is used.
-        sections: Its parts in order.
+    `warnings` is what must be known before the answer is used.
     """
 
     title: str
@@ -144,9 +132,7 @@ def tight(text: str) -> str:
 def fact_table(rows: tuple[tuple[str, ...], ...], head: tuple[str, ...]) -> Table:
     """Return a table of sentences, a column per run; what all runs share is said once.
 
-    Args:
-        rows: Label, then a text per run.
-        head: Headings of the columns, the first of the labels.
+    A row is a label, then a text per run.
     """
     shared = (Row(row[:2], "shared") if len(set(row[1:])) == 1 else Row(row) for row in rows)
     return Table(head, tuple(shared), columns="w" + "p" * (len(head) - 1), even=True)

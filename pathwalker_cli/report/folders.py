@@ -135,11 +135,8 @@ def studies_near(
 ) -> tuple[Study, ...]:
     """Return the studies that stand on one of the runs: named ones, and those found near.
 
-    Near is inside the folder of a run, beside it, or around it. Of each kind at most one counts.
-
-    Args:
-        runs: Folder and metrics of every run.
-        named: Folders of studies by kind.
+    A run is its folder and its metrics.  Near is inside that folder, beside it, or around it. Of
+    each kind at most one counts.
 
     Raises:
         DataError: If a study that was named stands on none of the runs.

@@ -24,7 +24,9 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
     sections = [spring_section(run) for run in runs if run.worn]
     sections += [change_section(runs, found), walk_section(runs), hinge_section(runs, studies)]
     sections += [curve_section(runs), gait_section(runs)]
-    sections += [study_section(study, _base(study, runs)) for study in studies]
+    for study in studies:
+        base = next((run for run in runs if study.stands_on(run.run.metrics)), runs[-1])
+        sections.append(study_section(study, base))
     sections.append(assumption_section(runs))
     facts = (
         Fact("Age", f"{patient.age:g} years"),
@@ -44,19 +46,11 @@ def _mass(runs: Sequence[ReportRun]) -> str:
     return f"{runs[0].patient.body_mass:g} kg{more}"
 
 
-def _base(study: Study, runs: Sequence[ReportRun]) -> ReportRun:
-    """Return the run that a study stands on."""
-    return next((run for run in runs if study.stands_on(run.run.metrics)), runs[-1])
-
-
 def _of_runs(runs: Sequence[ReportRun]) -> list[Fact]:
     """Return problem and date of every run; one date where they agree."""
     problems = ", ".join(f"{run.run.config.problem} ({run.label})" for run in runs)
     dates = dict.fromkeys(run.date for run in runs)
-    if len(dates) == 1:
-        date = next(iter(dates))
-    else:
-        date = ", ".join(f"{run.date} ({run.label})" for run in runs)
+    date = ", ".join(dates if len(dates) == 1 else (f"{run.date} ({run.label})" for run in runs))
     return [Fact("Problems" if len(runs) > 1 else "Problem", problems), Fact("Date", date)]
 
 

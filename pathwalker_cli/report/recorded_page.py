@@ -11,7 +11,6 @@ from pathwalker_cli.conventions import CONDITIONS, SIDES, SUFFIX, Condition
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.files import ORIGIN, READING
 from pathwalker_cli.inverse.laboratory import SHOWN, Difference, laboratory_rows
-from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.inverse.trials import read_trials
 from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.io.json_file import read_json
@@ -132,7 +131,7 @@ def _torques(
         trials = read_trials(folder, condition, stances)
     except (ValueError, KeyError) as problem:
         raise DataError(f"cannot be used: {problem}", where=str(folder / condition)) from None
-    if not any(_measured(trial) for trial in trials):
+    if not any(trial.tau and any(map(trial.measured, trial.cycles)) for trial in trials):
         return []
     title = (
         f"Net joint torques [N m/kg] over the gait cycle, {condition}: {origin['patient']}, mean "
@@ -140,11 +139,6 @@ def _torques(
     )
     name = f"torques-{index}-{condition}"
     return [torque_drawing(trials, float(origin["body_mass"]), name, title)]
-
-
-def _measured(trial: Trial) -> bool:
-    """Return whether some complete gait cycle begins with a measured stance."""
-    return trial.tau is not None and any(map(trial.measured, trial.cycles))
 
 
 def _readings(folder: Path, who: str) -> list[Section]:

@@ -38,37 +38,35 @@ def spring_section(run: ReportRun) -> Section:
     """Return the springs of a run with orthoses: real ones to fit, region, verdict."""
     verdict = run.verdict
     rows = tuple(_row(run, name) for name in STIFFNESSES)
-    notes = [
+    note = (
         "K_D resists dorsiflexion (the shin leaning forward), K_P plantarflexion (the foot "
         f"pointing down); does as well: the cost stays within {100 * SHARE:g} % of the best, all "
         "else optimal"
-    ]
-    lines: tuple[str, ...] = ()
-    facts: tuple[Fact, ...] = ()
-    if verdict is None:
-        free = any(not prescribed(run, name) for name in STIFFNESSES)
-        lines = (_NOT_JUDGED if free else _NO_CHOICE,)
-    else:
-        facts = tuple(_facts(verdict))
-    table = Table(_HEAD, rows, notes=tuple(notes), columns="wwnnp")
+    )
+    free = any(not prescribed(run, name) for name in STIFFNESSES)
+    lines = (_NOT_JUDGED if free else _NO_CHOICE,) if verdict is None else ()
+    facts = tuple(_facts(verdict)) if verdict else ()
+    table = Table(_HEAD, rows, notes=(note,), columns="wwnnp")
     named = "" if run.label == run.run.config.condition else f", {run.label}"
     return Section(f"Springs to fit{named}", lines, facts, (table,))
 
 
 def recommended(run: ReportRun) -> dict[str, float]:
     """Return the springs to take [N m/rad]: real ones where the run chose among them."""
-    if run.verdict is not None and run.verdict.snapped is not None:
-        chosen = run.verdict.snapped.stiffness
-    else:
-        chosen = {}
+    snapped = run.verdict.snapped if run.verdict else None
+    chosen = snapped.stiffness if snapped else {}
     return {name: chosen.get(name, _identified(run, name)) for name in STIFFNESSES}
 
 
 def left_open(run: ReportRun, name: str) -> bool:
     """Return whether the verdict found that a spring hardly matters."""
-    verdict = run.verdict
-    spring = next((s for s in verdict.springs if s.name == name), None) if verdict else None
+    spring = _judged(run, name)
     return spring is not None and spring.determined == NOT_DETERMINED
+
+
+def _judged(run: ReportRun, name: str) -> NumberVerdict | None:
+    springs = run.verdict.springs if run.verdict else ()
+    return next((spring for spring in springs if spring.name == name), None)
 
 
 def verdict_words(spring: NumberVerdict) -> str:
@@ -91,7 +89,7 @@ def _identified(run: ReportRun, name: str) -> float:
 def _row(run: ReportRun, name: str) -> Row:
     """Return the row of one spring."""
     take, identified, verdict = recommended(run)[name], _identified(run, name), run.verdict
-    spring = next((s for s in verdict.springs if s.name == name), None) if verdict else None
+    spring = _judged(run, name)
     snapped = verdict.snapped.names.get(name, "") if verdict and verdict.snapped else ""
     region, words = "-", PRESCRIBED if prescribed(run, name) else "not judged"
     if spring is not None:

@@ -79,14 +79,9 @@ def made_child(
     height: float | None = None,
     **measured: Any,
 ) -> Child:
-    """Return a made-up child; body mass and height follow from the age if they are not given.
+    """Return a child of an age [years]; mass [kg] and height [m] that are not given follow from it.
 
-    Args:
-        id_: Its id.
-        age: Age [years].
-        mass: Body mass [kg].
-        height: Height [m].
-        **measured: Further fields of `Child`.
+    `measured` are further fields of `Child`.
 
     Raises:
         PatientError: If the regressions of the segment masses do not hold for the age.

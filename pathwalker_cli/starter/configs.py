@@ -31,14 +31,9 @@ def unbroken(text: str) -> str:
 
 
 def commented(key: str, value: str, text: str, depth: int = 0, given: bool = True) -> str:
-    """Return a key with its value below its comment.
+    """Return a key with its value, "" for a block, below its comment, so many blocks further in.
 
-    Args:
-        key: The key.
-        value: Its value; "" for a block.
-        text: The comment; "" for none.
-        depth: How many blocks it stands in.
-        given: Whether the value counts; otherwise the line is a comment, too.
+    What is not `given` is written as a comment, too.
     """
     mark = "  " * depth + ("" if given else "# ")
     line = f"{mark}{key}: {value}".replace(": \n", ":\n").rstrip()
@@ -111,9 +106,7 @@ class ConfigFile:
 def config_files(seen: Seen, worn: bool) -> tuple[ConfigFile, ...]:
     """Return the configs of a new folder; C3D files are expected in c3d/.
 
-    Args:
-        seen: What is known of the child.
-        worn: Whether walks with an orthosis are recorded.
+    If `worn`, walks with an orthosis are among them.
     """
     with_orthosis = seen.with_orthosis
     patient = {"patient": "patient.yaml"}

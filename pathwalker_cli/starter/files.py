@@ -52,12 +52,7 @@ EXAMPLE_NOTE: Final = (
 
 @dataclass(frozen=True)
 class Step:
-    """One thing to do with a folder.
-
-    Args:
-        why: What it is for, a sentence.
-        commands: Commands, from within the folder.
-    """
+    """One thing to do within a folder: what it is for, in a sentence, and the commands."""
 
     why: str
     commands: tuple[str, ...] = ()
@@ -66,11 +61,7 @@ class Step:
 def folder_files(child: Child, seen: Seen, example: bool, walks: bool = False) -> dict[str, str]:
     """Return the texts of a new folder by file name.
 
-    Args:
-        child: The child.
-        seen: What was seen and examined of it.
-        example: Whether made recordings come with it.
-        walks: Whether recorded barefoot walks come with it.
+    `example` says whether made recordings come with it, `walks` whether recorded barefoot walks do.
     """
     with_orthosis = seen.with_orthosis
     files = {"patient.yaml": _patient(child, seen, {})}
@@ -103,13 +94,7 @@ def _is_recorded(seen: Seen, walks: bool) -> bool:
 
 
 def next_steps(seen: Seen, example: bool, walks: bool = False) -> tuple[Step, ...]:
-    """Return what to do with a new folder, one command after the other.
-
-    Args:
-        seen: What was seen and examined of the child.
-        example: Whether made recordings come with it.
-        walks: Whether recorded barefoot walks come with it.
-    """
+    """Return what to do with a new folder, one command after the other; see `folder_files`."""
     with_orthosis = seen.with_orthosis
     conditions = ("barefoot", "orthosis") if with_orthosis else ("barefoot",)
     problems = [f"mapd-{condition}" for condition in conditions]
@@ -129,7 +114,8 @@ def next_steps(seen: Seen, example: bool, walks: bool = False) -> tuple[Step, ..
     if not example and not walks:
         c3d = "With C3D recordings: put them into c3d/barefoot"
         c3d += " and c3d/orthosis" if _is_recorded(seen, walks) else ""
-        recorded = _begun(recorded, f"{c3d}. Without any, go on with step 5.")
+        first = f"{c3d}. Without any, go on with step 5. {recorded[0].why}"
+        recorded = (Step(first, imports), *recorded[1:])
     check = f"pathwalker check patient.yaml {' '.join(f'{name}.yaml' for name in problems)}"
     solves = tuple(f"pathwalker solve {n} {n}.yaml --out runs/{n}" for n in problems)
     last = problems[-1]
@@ -159,11 +145,6 @@ def command_lines(command: str, indent: int = 5) -> str:
         return margin + command
     head, mark, tail = command.rpartition(" -o ")
     return f"{margin}{head} \\\n{margin}   {mark}{tail}"
-
-
-def _begun(steps: tuple[Step, ...], first: str) -> tuple[Step, ...]:
-    """Return steps of which the first says something else before."""
-    return (Step(f"{first} {steps[0].why}", steps[0].commands), *steps[1:])
 
 
 def explained_keys() -> dict[str, dict[str, str]]:
@@ -279,14 +260,7 @@ def check_new(folder: Path) -> None:
 def write_folder(
     folder: Path, child: Child, seen: Seen, example: bool, walks: Sequence[Path] = ()
 ) -> None:
-    """Write a new folder for a child.
-
-    Args:
-        folder: The folder; new or empty.
-        child: The made-up child to begin with.
-        seen: What was seen and examined of it.
-        example: Whether to make C3D files of the child.
-        walks: C3D files of barefoot walks to copy into it.
+    """Write a new folder for a child, with made C3D files or copies of barefoot walks if wanted.
 
     Raises:
         DataError: If the folder is not empty or cannot be written.
