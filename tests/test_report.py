@@ -904,17 +904,6 @@ def test_recorded_gait_shows_stances_torques_and_strengths(recorded: Path, tmp_p
 
 def test_a_broken_stance_is_refused(recorded: Path, tmp_path: Path) -> None:
     copied = Path(shutil.copytree(recorded, tmp_path / "other"))
-    beside = {"quantity": "knee angle", "side": "left", "unit": "deg"}
-    beside |= {"rms": 3.0, "offset": -2.5, "offset_free": 1.5}
-    reading = {"condition": "barefoot", "trial": "walk", "notes": ["plate 2 is left out"]}
-    reading |= {"warnings": ["its path bends"], "laboratory": [beside, beside | {"rms": 4.0}]}
-    (copied / "barefoot" / "walk_reading.json").write_text(json.dumps(reading))
-    page = page_of([copied])
-    (row,) = section(page, "Beside the laboratory's own model").tables[0].rows
-    assert row.cells == ("barefoot, knee angle [deg]", "-", "3.5", "-", "-2.5", "-", "1.5")
-    assert section(page, "How the files were read").lines == (
-        "barefoot, walk: plate 2 is left out.", "barefoot, walk: its path bends.",
-    )  # fmt: skip
     path = copied / "stances.csv"
     path.write_text(path.read_text().replace("172,245", "x,245"))
     assert "cannot be used" in refusal(copied, "-o", tmp_path / "page.html")

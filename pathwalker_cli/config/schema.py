@@ -14,6 +14,7 @@ from pathwalker_cli.gait.costs import ELSEWHERE, GOALS, Costs
 from pathwalker_cli.installed import load_installed
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
 from pathwalker_cli.model.contact import (
+    HEEL_TOE,
     PHASE_NAMES,
     Contact,
     ContactPattern,
@@ -101,7 +102,7 @@ class ModelConfig(YamlModel):
 
     @model_validator(mode="after")
     def _rolling(self) -> ModelConfig:
-        if self.feet == "sole" and set(self.uses) != {"heel_toe"}:
+        if self.feet == "sole" and self.uses != HEEL_TOE:
             raise invalid(
                 "gives model.contact for feet with soles, which roll over whatever they land on",
                 mend="leave contact out, or set feet to rockers",
@@ -275,7 +276,7 @@ class StudyConfig(YamlModel):
         return value
 
     @model_validator(mode="after")
-    def _one_per_phase(self) -> StudyConfig:
+    def _suits_the_feet(self) -> StudyConfig:
         given, names = self.mesh.intervals, self.model.pattern.names
         if isinstance(given, tuple) and len(given) != len(names):
             raise invalid(

@@ -6,9 +6,10 @@ one left step.  That of Sreenivasa et al. (2017), section 2.3, is "heel_toe" on 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import product
 from typing import Final, Literal
 
 import numpy as np
@@ -28,6 +29,9 @@ the toe alone."""
 
 Contact = tuple[Use, Use]
 """Use of the right and the left foot."""
+
+HEEL_TOE: Final[Contact] = ("heel_toe", "heel_toe")
+"""That of the article."""
 
 
 @dataclass(frozen=True)
@@ -182,15 +186,16 @@ class ContactPattern:
 
     def strike(self, side: Side) -> int:
         """Return the number of the phase that begins with the foot strike of a side."""
-        pairs = zip(self.following, self.phases, strict=True)
-        came = [side in after.feet and side not in phase.feet for after, phase in pairs]
-        return (came.index(True) + 1) % len(self.phases)
+        return self._turn(side, stands=True)
 
     def toe_off(self, side: Side) -> int:
         """Return the number of the phase that begins with the toe-off of a side."""
-        pairs = zip(self.following, self.phases, strict=True)
-        went = [side in phase.feet and side not in after.feet for after, phase in pairs]
-        return (went.index(True) + 1) % len(self.phases)
+        return self._turn(side, stands=False)
+
+    def _turn(self, side: Side, stands: bool) -> int:
+        """Return the number of the first phase in which a foot stands, or no longer does."""
+        on = [side in phase.feet for phase in self.phases]
+        return next(i for i, now in enumerate(on) if now == stands != on[i - 1])
 
     def durations(self, parts: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return the durations of the phases from those of `PHASES` [s].
@@ -210,8 +215,16 @@ POINTS: Final = tuple(ContactPoint(place, side) for side in SIDES for place in (
 
 _SOLES: Final = tuple(ContactPoint("sole", side) for side in SIDES)
 
-_SINGLE: Final = {"heel_toe": ("flat", "toe"), "flat": ("flat", "toe"), "toe": ("toe",)}
-_LANDING: Final = {"heel_toe": ("heel", "flat"), "flat": ("flat",), "toe": ("toe",)}
+_SINGLE: Final[Mapping[Use, tuple[str, ...]]] = {
+    "heel_toe": ("flat", "toe"),
+    "flat": ("flat", "toe"),
+    "toe": ("toe",),
+}
+_LANDING: Final[Mapping[Use, tuple[str, ...]]] = {
+    "heel_toe": ("heel", "flat"),
+    "flat": ("flat",),
+    "toe": ("toe",),
+}
 """What of a foot is on the ground, in order: while the other swings, and after it has landed."""
 
 
@@ -220,7 +233,7 @@ def _on(side: Side, posture: str) -> tuple[ContactForce, ...]:
     if posture == "flat":
         heel, toe = (ContactPoint(place, side) for place in ("heel", "toe"))
         return ContactForce(heel, "x"), ContactForce(heel, "z"), ContactForce(toe, "z")
-    place = next(p for p in (*POINTS, *_SOLES) if p.side == side and p.place == posture)
+    place = next(p for p in (*POINTS, *_SOLES) if (p.place, p.side) == (posture, side))
     return ContactForce(place, "x"), ContactForce(place, "z")
 
 
@@ -240,9 +253,7 @@ def _step(side: Side, single: Sequence[str], landing: Sequence[str]) -> list[Con
 
 
 @cache
-def contact_pattern(
-    feet: Feet = "points", contact: Contact = ("heel_toe", "heel_toe")
-) -> ContactPattern:
+def contact_pattern(feet: Feet = "points", contact: Contact = HEEL_TOE) -> ContactPattern:
     """Return the pattern of feet that are used like this."""
     if feet == "sole":
         phases = [p for side in SIDES for p in _step(side, ("sole",), ("sole",))]
@@ -256,9 +267,8 @@ def contact_pattern(
 PHASES: Final = contact_pattern().phases
 """The eight phases of a stride from heel to toe."""
 
-_USES: Final[tuple[Use, ...]] = ("heel_toe", "flat", "toe")
 PATTERNS: Final = (
-    *(contact_pattern("points", (right, left)) for right in _USES for left in _USES),
+    *(contact_pattern("points", use) for use in product(_SINGLE, repeat=2)),
     contact_pattern("sole"),
 )
 """All patterns that there are."""

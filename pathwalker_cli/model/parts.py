@@ -8,7 +8,14 @@ from functools import cached_property
 from typing import Final
 
 from pathwalker_cli.conventions import Condition
-from pathwalker_cli.model.contact import POINTS, Contact, ContactPattern, Feet, contact_pattern
+from pathwalker_cli.model.contact import (
+    HEEL_TOE,
+    POINTS,
+    Contact,
+    ContactPattern,
+    Feet,
+    contact_pattern,
+)
 from pathwalker_cli.model.devices import DEVICES, Device
 from pathwalker_cli.model.elements import ForceElement, registered_elements
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
@@ -34,7 +41,7 @@ class Parts:
     condition: Condition = "barefoot"
     tissue: bool = False
     feet: Feet = "points"
-    contact: Contact = ("heel_toe", "heel_toe")
+    contact: Contact = HEEL_TOE
     further: tuple[str, ...] = ()
 
     @property

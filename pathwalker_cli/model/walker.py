@@ -16,6 +16,7 @@ from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.backends import rigid_body_functions
 from pathwalker_cli.model.backends.functions import RigidBodyFunctions
 from pathwalker_cli.model.contact import (
+    HEEL_TOE,
     POINTS,
     Contact,
     ContactPattern,
@@ -368,7 +369,7 @@ def build_walker(
     free: Sequence[str] = (),
     tissue: bool = False,
     feet: Feet = "points",
-    contact: Contact = ("heel_toe", "heel_toe"),
+    contact: Contact = HEEL_TOE,
     further: Sequence[str] = (),
 ) -> Walker:
     """Return the walking model of a patient; see `Parts` and `walker_of`.
