@@ -31,7 +31,7 @@ from pathwalker_cli.io.recordings import read_compact
 from pathwalker_cli.io.yaml_file import read_mapping, yaml_text
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results.motion_file import read_motion, read_multipliers
+from pathwalker_cli.gait.motion_file import read_motion, read_multipliers
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.batch.cases import load_cases

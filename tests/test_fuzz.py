@@ -42,7 +42,7 @@ from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.nlp import tape_store
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results.motion_file import read_motion, read_multipliers, write_motion
+from pathwalker_cli.gait.motion_file import read_motion, read_multipliers, write_motion
 from pathwalker_cli.studies.batch.schema import load_batch
 
 Read = Callable[[Path], Any]

@@ -73,7 +73,7 @@ from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.blocks import OrthosisData
-from pathwalker_cli.results.motion_file import read_motion, write_motion
+from pathwalker_cli.gait.motion_file import read_motion, write_motion
 from pathwalker_cli.results.text import angle_words, summary_rows
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import gait_series

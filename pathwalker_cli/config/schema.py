@@ -207,13 +207,15 @@ class MeshConfig(YamlModel):
     least_intervals_per_phase: Annotated[int, Field(ge=1, le=50)] = 2
     position_tolerance: Annotated[float, Quantity("rad or m", 1e-8, 1.0)] = 1e-3
     velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2
+    cost_tolerance: Annotated[float, Quantity("", 1e-6, 1.0)] = 0.005
     refinements: Annotated[int, Field(ge=0, le=20)] = 12
 
 
 class StartConfig(YamlModel):
     """Where the search begins."""
 
-    gait: Literal["synthetic", "recorded"] = "synthetic"
+    gait: Literal["typical", "synthetic", "recorded"] = "typical"
+    walk: Annotated[int, Field(ge=0, le=99)] = 0
     trial: TrialName = ""
     condition: Condition = "barefoot"
     knee_flexion: Annotated[float, Quantity("rad", 0.05, 1.5, above="is it in degrees?")] = 0.7
@@ -222,6 +224,18 @@ class StartConfig(YamlModel):
     stiffness: Annotated[dict[str, Stiffness], _keys_of(STIFFNESSES)] = Field(default_factory=dict)
     free: dict[str, Amount] = Field(default_factory=dict)
     seed: Annotated[int, Field(ge=0)] = 0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _synthetic_if_shaped(cls, value: Any) -> Any:
+        """Take a synthetic stride where its shape is given."""
+        if isinstance(value, dict) and _SHAPE.intersection(value):
+            return {"gait": "synthetic", **value}
+        return value
+
+
+_SHAPE: Final = {"knee_flexion", "stride_ratio", "walking_speed"}
+"""Keys of the start that a synthetic stride alone follows."""
 
 
 class SolverConfig(YamlModel):
@@ -299,13 +313,13 @@ class StudyConfig(YamlModel):
     def _start(self) -> StudyConfig:
         if self.start.trial and self.start.gait != "recorded":
             raise invalid(
-                "names a start.trial but start.gait is synthetic",
+                f"names a start.trial but start.gait is {self.start.gait}",
                 mend="set start.gait to recorded, or leave start.trial out",
             )
         if self.fits and (self.half_cycle or self.start.gait != "recorded"):
             raise invalid(
                 f"asks {self.problem} for a "
-                + ("half cycle" if self.half_cycle else "synthetic start"),
+                + ("half cycle" if self.half_cycle else f"{self.start.gait} start"),
                 allowed="a whole recorded passage: start.gait recorded, half_cycle false",
             )
         return self

@@ -35,6 +35,11 @@ FEWEST_FRAMES: Final = 2
 """Frames of a recorded phase, at the least."""
 SLOWEST: Final = 0.1
 """Least speed of a stylised gait as a Froude number's root, v / sqrt(g leg length)."""
+TYPICAL_PATIENCE: Final = 200
+"""Iterations from a typical walk after which a stride is tracked instead; most need 40 to 120."""
+TYPICAL_BARRIER: Final = 1e-4
+TYPICAL_ACTIVATION: Final = (3e-3, 0.95)
+"""First barrier from a typical walk, and range of its activations: larger barriers leave it."""
 START_ACTIVATION: Final = 0.2
 """Activation of all muscles where the search begins."""
 CROUCH_SPREAD: Final = (0.35, 1.0)
@@ -75,6 +80,8 @@ EAGER_ROUND: Final = 4
 EAGER_SHARE: Final = 0.3
 """Round from which intervals are split at a share of the tolerance already: the solution moves
 from round to round, and would take the error to another interval that just met it before."""
+COST_AIM: Final = 0.5
+"""Share of the cost's tolerance that intervals which are not split may change it by."""
 AIM: Final = 2.0
 MOST_PARTS: Final = 4
 """By how much a split interval shall beat the tolerance, as the next solution moves a little, and

@@ -32,20 +32,48 @@ def by_duration(
     return uniform(np.maximum(np.ceil(shares), least_per_phase).astype(int).tolist())
 
 
+def costly(shares: tuple[np.ndarray, ...], allowed: float) -> tuple[np.ndarray, ...]:
+    """Return which intervals have to be split until the others change the cost by less.
+
+    Args:
+        shares: What halving every interval would change the cost by, shape (N,) each.
+        allowed: Change of the cost that may be left.
+    """
+    size = np.abs(np.concatenate(shares))
+    order = np.argsort(size)
+    split = np.zeros(size.shape, bool)
+    split[order] = np.cumsum(size[order]) > allowed
+    return tuple(np.split(split, np.cumsum([len(part) for part in shares])[:-1]))
+
+
 def refined(
-    meshes: tuple[np.ndarray, ...], errors: Reintegration, config: MeshConfig, share: float = 1.0
+    meshes: tuple[np.ndarray, ...],
+    errors: Reintegration,
+    costly: tuple[np.ndarray, ...],
+    config: MeshConfig,
+    share: float = 1.0,
 ) -> tuple[np.ndarray, ...]:
     """Return a mesh in which intervals above a share of the tolerances are split.
 
     The degree is the order of the error in the length of an interval.
+
+    Args:
+        meshes: Node positions of every phase.
+        errors: Errors of an independent integrator on it.
+        costly: Which intervals are split for the cost, shape (N,) each; see `costly`.
+        config: The tolerances.
+        share: The share of them.
     """
     result = []
-    for mesh, position, velocity in zip(meshes, errors.position, errors.velocity, strict=True):
+    for mesh, position, velocity, dear in zip(
+        meshes, errors.position, errors.velocity, costly, strict=True
+    ):
         ratio = np.maximum(
             position / config.position_tolerance, velocity / config.velocity_tolerance
         )
         parts = np.ceil(np.clip(choices.AIM * ratio, 1e-9, 1e6) ** (1.0 / config.degree))
         parts = np.where(ratio > share, np.clip(parts, 2, choices.MOST_PARTS), 1).astype(int)
+        parts = np.maximum(parts, np.where(dear, 2, 1))
         pieces = [
             np.linspace(mesh[i], mesh[i + 1], n + 1)[:-1] for i, n in enumerate(parts.tolist())
         ]

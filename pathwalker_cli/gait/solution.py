@@ -141,6 +141,8 @@ class GaitSolution:
         cost_terms: Its terms by name; they add up to the cost.
         violations: Largest violations, largest first.
         reintegration: Errors of an independent integrator.
+        cost_error: Estimated change of the cost if all mesh intervals were halved; None where it
+            is not known.
         start: Where the search began.
         seconds: Wall seconds by part: build, solve, verify.
         optima: Where all starts ended, best first; empty for a single start.
@@ -158,6 +160,7 @@ class GaitSolution:
     violations: tuple[Violation, ...]
     active: tuple[ActiveBound, ...]
     reintegration: Reintegration
+    cost_error: float | None
     start: str
     stages: tuple[StageRecord, ...]
     seconds: dict[str, float]

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from typing import Final
 
 import numpy as np
 
@@ -39,10 +40,12 @@ from pathwalker_cli.gait.solution import (
 from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.gait.stylised import stylised_stride
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
+from pathwalker_cli.gait.typical import TypicalWalk, typical_walks
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
 from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.cost_error import CostError, cost_error
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers, Sample
@@ -51,6 +54,8 @@ from pathwalker_cli.stride.series import gait_series
 from pathwalker_cli.stride.verify import Reintegration, reintegrate
 
 StageObserver = Callable[[str, ProgressReport], None]
+EARLIER: Final = "earlier run"
+"""Start of a solve that begins with a motion of another one."""
 Stage = tuple[CollocationProgram, NlpResult]
 """A solved stage."""
 
@@ -203,18 +208,50 @@ class GaitSolver:
         self.shortfall = None
         if self.config.mesh.refinements:
             tolerance = max(tolerance, solver.first_tolerance)
-        if warm_start is None:
-            program, result = self._track()
+        if warm_start is not None:
+            start = EARLIER
+            settings = self.settings(tolerance, solver.warm_barrier)
+            stage = self._on_first_mesh(self._warm_motion(warm_start), settings)
+        else:
+            start, stage = self._from_typical_walk(tolerance) or self._from_stride(tolerance)
+        program, result, errors = self._refine(*stage, tolerance)
+        return self._finish(program, result, errors, start)
+
+    def _from_typical_walk(self, tolerance: float) -> tuple[str, Stage] | None:
+        """Predict on the first mesh from the typical walk of the most similar child.
+
+        Returns None where none is wanted, there is none with these phases, or it leads nowhere.
+        """
+        wanted, which = self.config.start.gait == "typical", self.config.start.walk
+        walks = typical_walks(self.walker) if wanted else []
+        if which >= len(walks):
+            return None
+        walk = walks[which]
+        settings = self.settings(tolerance, choices.TYPICAL_BARRIER)
+        limit = min(choices.TYPICAL_PATIENCE, settings.max_iterations)
+        settings = replace(settings, max_iterations=limit)
+        motion = self._typical_motion(walk)
+        stage = self.stage("first mesh", motion, self.prediction, settings)
+        if not stage[1].converged and not self._interrupted:
+            return None
+        return f"typical walk {walk.name}", stage
+
+    def _typical_motion(self, walk: TypicalWalk) -> PhasedMotion:
+        """Return a typical walk on the first mesh, scaled to the walker."""
+        motion, mesh = walk.scaled(self.walker, self.parameter_guess()), self.config.mesh
+        motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])
+        motion = with_goal_costs(motion, self.gait.costs, self.walker)
+        return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
+
+    def _from_stride(self, tolerance: float) -> tuple[str, Stage]:
+        """Predict on the first mesh from the config's stride, which is tracked first."""
+        program, result = self._track()
+        if not self._interrupted:
             motion = program.to_motion(result.unknowns)
             motion = replace(motion, parameters=self.parameter_guess())
-            settings = self.settings(tolerance, solver.first_barrier)
-        else:
-            motion = self._warm_motion(warm_start)
-            settings = self.settings(tolerance, solver.warm_barrier)
-        if not self._interrupted:
+            settings = self.settings(tolerance, self.config.solver.first_barrier)
             program, result = self._on_first_mesh(motion, settings)
-        program, result, errors = self._refine(program, result, settings.tolerance)
-        return self._finish(program, result, errors, warm_start is not None)
+        return self.stride.name, (program, result)
 
     def _warm_motion(self, motion: PhasedMotion) -> PhasedMotion:
         """Return an earlier motion as a start of this problem."""
@@ -229,7 +266,7 @@ class GaitSolver:
     def restored(self, result: NlpResult, meshes: tuple[np.ndarray, ...]) -> GaitSolution:
         """Return the solution that another process found on these meshes."""
         program = CollocationProgram(self.blocks, self.prediction, meshes)
-        return self._finish(program, result, self._errors(program, result), False)
+        return self._finish(program, result, self._errors(program, result), EARLIER)
 
     def _on_first_mesh(self, motion: PhasedMotion, settings: IpoptSettings) -> Stage:
         """Predict on the first mesh; if that fails, by way of a motion that reserves help along."""
@@ -293,15 +330,20 @@ class GaitSolver:
     def _refine(
         self, program: CollocationProgram, result: NlpResult, tolerance: float
     ) -> tuple[CollocationProgram, NlpResult, Reintegration]:
-        """Refine the mesh until an independent integrator agrees."""
+        """Refine the mesh until an independent integrator agrees and the cost stays."""
         mesh, solver = self.config.mesh, self.config.solver
         errors = self._errors(program, result, choices.MESHING_TOLERANCE)
         for attempt in range(1, mesh.refinements + 1):
-            done = _within(errors, mesh) and tolerance <= solver.tolerance
-            if not result.converged or done or self._interrupted:
+            if not result.converged or self._interrupted:
                 break
+            shares = self._cost_error(program, result).shares
+            allowed = mesh.cost_tolerance * abs(result.objective)
+            settled = sum(np.abs(part).sum() for part in shares) <= allowed
+            if settled and _within(errors, mesh) and tolerance <= solver.tolerance:
+                break
+            costly = meshing.costly(shares, allowed * (1.0 if settled else choices.COST_AIM))
             share = choices.EAGER_SHARE if attempt >= choices.EAGER_ROUND else 1.0
-            meshes = meshing.refined(program.meshes, errors, mesh, share)
+            meshes = meshing.refined(program.meshes, errors, costly, mesh, share)
             start = program.to_motion(result.unknowns).resampled(meshes, mesh.degree)
             name, before = f"refined {attempt}", (program, result)
             program, result = self._refined(name, start, before, tolerance)
@@ -329,8 +371,15 @@ class GaitSolver:
         self.seconds["verify"] += time.perf_counter() - began
         return errors
 
+    def _cost_error(self, program: CollocationProgram, result: NlpResult) -> CostError:
+        """Return what halving every interval would change the cost by, as estimated."""
+        began = time.perf_counter()
+        error = cost_error(program, result)
+        self.seconds["verify"] += time.perf_counter() - began
+        return error
+
     def _finish(
-        self, program: CollocationProgram, result: NlpResult, errors: Reintegration, warm: bool
+        self, program: CollocationProgram, result: NlpResult, errors: Reintegration, start: str
     ) -> GaitSolution:
         mesh, status = self.config.mesh, result.status
         if result.converged and mesh.refinements and not _within(errors, mesh):
@@ -350,7 +399,8 @@ class GaitSolver:
             violations=largest_violations(program, result),
             active=active_bounds(program, result),
             reintegration=errors,
-            start="earlier run" if warm else self.stride.name,
+            cost_error=self._cost_error(program, result).total if result.converged else None,
+            start=start,
             stages=tuple(self.stages),
             seconds=dict(self.seconds),
             shortfall=self.shortfall,

@@ -97,7 +97,7 @@ def _solved(number: int, case: Case) -> _Outcome:
     last = solution.last_motion
     optimum = LocalOptimum(
         start=number,
-        description=solver.stride.name,
+        description=solution.start,
         status=solution.status,
         cost=solution.cost,
         walking_speed=walked_distance(last) / last.duration,

@@ -129,6 +129,27 @@ class KktSystem:
         return self._followed(answer, pull, list(range(len(self.free))))
 
     @cached_property
+    def step(self) -> tuple[np.ndarray, np.ndarray]:
+        """What a Newton step changes the cost by, from a point near an optimum, not at it.
+
+        Returns:
+            The shares of the unknowns (n,) and of the rows (m,); their sum is the value of
+            L + r d / 2 there less the cost, with the step d and the residuals r of the conditions
+            of optimality. Free parameters stay.
+        """
+        multipliers = self.result.multipliers
+        _, gradient, rows = self._own_first_order
+        lower, upper = self.program.row_bounds
+        # a row that is met and not pressed on has no residual
+        missed = np.where(rows > upper, rows - upper, np.minimum(rows - lower, 0.0))
+        residual = gradient + multipliers.unknowns
+        residual[self._fixed] = 0.0
+        change = _Change(0.0, residual, missed, np.zeros(len(residual)))
+        answer = self._answer(change)
+        along = multipliers.rows + answer.rows / 2.0
+        return residual * answer.unknowns / 2.0, missed * along
+
+    @cached_property
     def parameter_answers(self) -> tuple[Answer, ...]:
         """Derivatives by every free parameter (scaled), the others held."""
         n, m = len(self.result.unknowns), len(self.result.rows)

@@ -61,6 +61,7 @@ class RunMetrics(BaseModel):
     violations: list[dict[str, Any]] = []
     reintegration_position_error: Number = None
     reintegration_velocity_error: Number = None
+    cost_error: Number = None
     second_engine_residual: Number = None
     balance: dict[str, Number] = {}
     shortfall: dict[str, Any] | None = None
@@ -200,6 +201,7 @@ def _proof(solution: GaitSolution) -> dict[str, Any]:
         "violations": [asdict(violation) for violation in solution.violations],
         "reintegration_position_error": errors.worst_position,
         "reintegration_velocity_error": errors.worst_velocity,
+        "cost_error": solution.cost_error,
         "second_engine_residual": solution.second_engine,
         "balance": asdict(balance(solution.last_iterate)),
         "shortfall": None if solution.shortfall is None else solution.shortfall.as_dict(),

@@ -19,6 +19,12 @@ from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait.costs import ELSEWHERE, GOALS
+from pathwalker_cli.gait.motion_file import (
+    read_motion,
+    read_multipliers,
+    write_motion,
+    write_multipliers,
+)
 from pathwalker_cli.gait.recorded import start_recording
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.inverse.figures import recorded_reference
@@ -37,12 +43,6 @@ from pathwalker_cli.results.metrics import (
     run_inputs,
     run_metrics,
     sha256,
-)
-from pathwalker_cli.results.motion_file import (
-    read_motion,
-    read_multipliers,
-    write_motion,
-    write_multipliers,
 )
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.results.text import shortfall_text

@@ -199,6 +199,7 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
         ("clinical goals", ", ".join(f"{_words(n)} {v:.4g}" for n, v in metrics["goals"].items())),
         ("largest violation", f"{worst.amount:.1e} ({worst.name})"),
         ("re-integration error", again),
+        ("discretisation", _discretisation_text(solution)),
         ("second engine", f"equations of motion met within {solution.second_engine:.1e} N or N m"),
         ("balances", _balance_text(metrics["balance"])),
         (
@@ -209,6 +210,13 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
         ("dynamics, start", f"{solution.walker.backend}, {solution.start}"),
     ]
     return [*rows, *(("active bound", line) for line in bound_lines(solution))]
+
+
+def _discretisation_text(solution: GaitSolution) -> str:
+    if solution.cost_error is None:
+        return "not estimated"
+    share = 100.0 * solution.cost_error / abs(solution.cost)
+    return f"halving all mesh intervals would change the cost by about {share:+.2g} %"
 
 
 def _balance_text(found: Mapping[str, float]) -> str:

@@ -13,12 +13,12 @@ import numpy as np
 from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait.cost_terms import walked_distance
+from pathwalker_cli.gait.motion_file import read_arrays
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.io.processes import results_of_calls
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
 from pathwalker_cli.results.metrics import sha256
-from pathwalker_cli.results.motion_file import read_arrays
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import require_optimum, resolver_of
 from pathwalker_cli.studies.branches import Solve, Values
