@@ -233,6 +233,17 @@ class StartConfig(YamlModel):
             return {"gait": "synthetic", **value}
         return value
 
+    @model_validator(mode="after")
+    def _shaped(self) -> StartConfig:
+        usual = type(self).model_fields
+        for key in sorted(_SHAPE) if self.gait == "typical" else ():
+            if getattr(self, key) != usual[key].default:
+                raise invalid(
+                    f"gives start.{key}, which a typical walk does not follow",
+                    mend="set start.gait to synthetic",
+                )
+        return self
+
 
 _SHAPE: Final = {"knee_flexion", "stride_ratio", "walking_speed"}
 """Keys of the start that a synthetic stride alone follows."""
@@ -270,6 +281,7 @@ class StudyConfig(YamlModel):
     half_cycle: bool = False
     starts: Annotated[int, Field(ge=1, le=1000)] = 1
     verdict: bool = True
+    figures: Literal["all", "svg", "none"] = "all"
     smoke: bool = False
 
     @model_validator(mode="before")

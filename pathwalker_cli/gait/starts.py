@@ -1,7 +1,8 @@
 """Several starts of one study: all local optima that they lead to, and the best of them.
 
-The problem is not convex; a start decides which optimum is found.  Starts differ in crouch, step
-length, speed and stiffness, spread by a Latin hypercube; the first one is the study's own.
+The problem is not convex; a start decides which optimum is found.  The first one is the study's
+own; where that is a typical walk, the others come next.  Further starts differ in crouch, step length,
+speed and stiffness, spread by a Latin hypercube.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, Shortfall, StageRecord
 from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.gait.typical import typical_walks
 from pathwalker_cli.io.processes import results_of_calls
 from pathwalker_cli.nlp.ipopt import NlpResult
 
@@ -45,9 +47,14 @@ def spread_starts(solver: GaitSolver) -> list[Case]:
     spread = (choices.CROUCH_SPREAD, choices.STRIDE_SPREAD, choices.SPEED_SPREAD)
     low = [*(pair[0] for pair in spread), *lower]
     high = [*(pair[1] for pair in spread), *upper]
-    cube = qmc.LatinHypercube(len(low), rng=np.random.default_rng(config.start.seed))
-    points = qmc.scale(cube.random(config.starts - 1), low, high)
+    walks = len(typical_walks(solver.walker)) if config.start.gait == "typical" else 0
     studies = [single]
+    for walk in range(min(walks, config.starts)):
+        if walk != config.start.walk:
+            start = config.start.model_copy(update={"walk": walk})
+            studies.append(single.model_copy(update={"start": start}))
+    cube = qmc.LatinHypercube(len(low), rng=np.random.default_rng(config.start.seed))
+    points = qmc.scale(cube.random(config.starts - len(studies)), low, high)
     for knee_flexion, stride_ratio, faster, *free in points.tolist():
         start = config.start.model_copy(
             update={

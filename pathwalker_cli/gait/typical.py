@@ -55,8 +55,8 @@ class TypicalWalk:
             DataError: If it is missing or damaged.
         """
         arrays = read_arrays(path)
-        about = (float(arrays[key]) for key in ("leg_length", "weight"))
-        return cls(path.stem, read_motion(path), *about, arrays["strengths"])
+        size = float(arrays["leg_length"]), float(arrays["weight"])
+        return cls(path.stem, read_motion(path), *size, arrays["strengths"])
 
     def scaled(self, walker: Walker, parameters: np.ndarray) -> PhasedMotion:
         """Return the stride of a walker of other size and strength.

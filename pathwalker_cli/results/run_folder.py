@@ -46,8 +46,7 @@ from pathwalker_cli.results.metrics import (
 )
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.results.text import shortfall_text
-from pathwalker_cli.stride.figures import save_figures
-from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.stride.figures.save import FORMATS, save_figures
 
 CONFIG: Final = "config.resolved.yaml"
 """The config of a run with every value written out."""
@@ -132,7 +131,7 @@ def write_run(
         if solution.converged and solution.config.transcription == "collocation":
             write_multipliers(staging / _MULTIPLIERS, solution.nlp.multipliers)
             result.multipliers_hash = sha256((staging / _MULTIPLIERS).read_bytes())
-        _write_series(staging, solution.last_iterate)
+        _write_series(staging, solution)
         if not solution.converged:
             (staging / _SEAL).write_text(_seal(solution), encoding="utf-8")
         content = result.content()
@@ -148,13 +147,17 @@ def _keep_recording(folder: Path, solution: GaitSolution) -> None:
         write_recording(folder / _RECORDINGS / start.condition, recording)
 
 
-def _write_series(folder: Path, series: GaitSeries) -> None:
+def _write_series(folder: Path, solution: GaitSolution) -> None:
     """Write tables and figures; no figures of a last iterate that holds no numbers."""
+    series, wanted = solution.last_iterate, solution.config.figures
     for name, write in TABLES.items():
         write(folder / name, series)
-    if all(np.isfinite(values).all() for values in (series.q, series.force, series.net_torque)):
+    if wanted != "none" and all(
+        np.isfinite(values).all() for values in (series.q, series.force, series.net_torque)
+    ):
         reference = recorded_reference(series.walker.patient, series.walker.condition)
-        save_figures(series, folder / "figures", reference)
+        formats = FORMATS if wanted == "all" else (wanted,)
+        save_figures(series, folder / "figures", reference, formats)
 
 
 def _seal(solution: GaitSolution) -> str:

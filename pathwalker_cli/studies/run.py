@@ -133,8 +133,9 @@ def _same_patient(run: Run, case: Case) -> bool:
 
 def _same_problem(run: Run, case: Case) -> bool:
     """Return whether a run solved just this problem, whatever was asked about it afterwards."""
-    asked = {"verdict": run.config.verdict, "starts": run.config.starts}
-    same = config_text(case.config.model_copy(update=asked)) == config_text(run.config)
+    kept = run.config
+    asked = {"verdict": kept.verdict, "starts": kept.starts, "figures": kept.figures}
+    same = config_text(case.config.model_copy(update=asked)) == config_text(kept)
     return same and _same_patient(run, case)
 
 

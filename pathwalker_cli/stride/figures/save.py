@@ -59,13 +59,16 @@ def make_figure(name: str, series: GaitSeries, reference: Reference | None = Non
 
 
 def save_figures(
-    series: GaitSeries, folder: str | Path, reference: Reference | None = None
+    series: GaitSeries,
+    folder: str | Path,
+    reference: Reference | None = None,
+    formats: Sequence[str] = FORMATS,
 ) -> tuple[str, ...]:
     """Save every figure of a stride over recorded bands; return the file names."""
     return tuple(
         file
         for name in figure_names(series)
-        for file in save_formats(make_figure(name, series, reference), folder, name)
+        for file in save_formats(make_figure(name, series, reference), folder, name, formats)
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig, find_config, load_config, place_of, with_values
@@ -27,6 +27,9 @@ from pathwalker_cli.studies.batch.schema import (
     short_keys,
     slug,
 )
+
+_QUIET: Final = {"figures": "none"}
+"""Overrides of every case unless the study has others: nobody looks at a hundred figures."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ def load_cases(path: str | Path, changes: tuple[str, ...] = ()) -> Batch:
     folders = {key: place_of(key, source, changes) for key in ("patients", "problems")}
     patients = listed_patients(study.patients, folders["patients"], source, where)
     problems = {
-        name: overridden(config, study.set, f"{where}, set, problem {name}")
+        name: overridden(config, _QUIET | study.set, f"{where}, set, problem {name}")
         for name, config in listed_problems(study.problems, folders["problems"], where).items()
     }
     warm_starts = _warm_starts(study, problems, source, where)
