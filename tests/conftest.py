@@ -159,6 +159,7 @@ def made_solution() -> MadeSolution:
                 ActiveBound("hip_extension_r_activation", "lower", 0.0, ("right_toe",)),
             ),
             reintegration=Reintegration(errors, errors),
+            cost_error=-8e-4,
             start="synthetic",
             stages=(StageRecord("fine", "converged", 32, 5000, 42, 1.5, 0.5),),
             seconds={"build": 1.0, "solve": 1.5, "verify": 0.2},

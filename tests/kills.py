@@ -29,8 +29,8 @@ from typing import Any, Final
 import yaml
 
 from pathwalker_cli.errors import NotConvergedError
-from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.gait.motion_file import read_arrays
+from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.results.run_folder import load_run
 
 PROGRAM: Final = [sys.executable, "-c", "from pathwalker_cli.cli import main; main()"]

@@ -24,6 +24,7 @@ from pathwalker_cli.checking.kinds import KINDS, check_orthosis
 from pathwalker_cli.cli import REFUSED, cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import InputError
+from pathwalker_cli.gait.motion_file import read_motion, read_multipliers
 from pathwalker_cli.inverse.markers import load_marker_set
 from pathwalker_cli.inverse.study import load_inverse_dynamics, load_inverse_kinematics
 from pathwalker_cli.io import c3d
@@ -31,7 +32,6 @@ from pathwalker_cli.io.recordings import read_compact
 from pathwalker_cli.io.yaml_file import read_mapping, yaml_text
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.gait.motion_file import read_motion, read_multipliers
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.studies.base import load_study
 from pathwalker_cli.studies.batch.cases import load_cases

@@ -22,11 +22,14 @@ from pathwalker_cli.ocp.problem import (
 )
 
 
-def double_integrator(nonlinear: bool = False) -> tuple[MultiPhaseProblem, ProblemNumbers]:
-    """Return: move a unit mass by 1 m from rest to rest in 1 s with least integral of force^2.
+def double_integrator(
+    nonlinear: bool = False, power: int = 2
+) -> tuple[MultiPhaseProblem, ProblemNumbers]:
+    """Return: move a unit mass by 1 m from rest to rest in 1 s with least integral of force^power.
 
-    Two phases of 0.5 s; the force is the algebraic variable; optimum 12 (closed form), force
-    6 - 12 t.  With `nonlinear` the force acts through a frozen exponential that undoes a logarithm.
+    Two phases of 0.5 s; the force is the algebraic variable; optimum 12 (closed form) for a power
+    of 2, force 6 - 12 t.  With `nonlinear` the force acts through a frozen exponential that undoes
+    a logarithm.
     """
     x = Variables.make("x", ("position", "speed"), np.array([1.0, 2.0]))
     y = Variables.make("y", ("smooth",), 1.0)
@@ -50,7 +53,7 @@ def double_integrator(nonlinear: bool = False) -> tuple[MultiPhaseProblem, Probl
                 path=Rows.make(x.symbol[1], ("forward",), 1.0, -10.0, np.inf),
                 end=Rows(),
                 fixed_at_end=(),
-                integrands=z.symbol[1] ** 2,
+                integrands=z.symbol[1] ** power,
                 frozen=frozen,
             )
         )

@@ -29,6 +29,7 @@ from helpers import stylised_series
 from made_c3d import checked, write_c3d
 from pathwalker_cli.config import load_config
 from pathwalker_cli.errors import DataError, InputError
+from pathwalker_cli.gait.motion_file import read_motion, read_multipliers, write_motion
 from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.markers import load_marker_set
 from pathwalker_cli.inverse.study import RecordedConfig
@@ -42,7 +43,6 @@ from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.nlp import tape_store
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.gait.motion_file import read_motion, read_multipliers, write_motion
 from pathwalker_cli.studies.batch.schema import load_batch
 
 Read = Callable[[Path], Any]

@@ -51,6 +51,7 @@ from pathwalker_cli.errors import ConfigError, PatientError
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.cost_terms import cost_terms
 from pathwalker_cli.gait.costs import Costs, Instant
+from pathwalker_cli.gait.motion_file import read_motion, write_motion
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.symmetry import asymmetries, full_stride
 from pathwalker_cli.inverse.files import write_strengths_yaml
@@ -73,7 +74,6 @@ from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.blocks import OrthosisData
-from pathwalker_cli.gait.motion_file import read_motion, write_motion
 from pathwalker_cli.results.text import angle_words, summary_rows
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import gait_series

@@ -16,11 +16,11 @@ from pathwalker_cli.case import config_text
 from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import DataError, NotConvergedError
+from pathwalker_cli.gait.motion_file import read_motion, write_motion
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.ocp.violations import Violation
 from pathwalker_cli.results import run_folder
-from pathwalker_cli.gait.motion_file import read_motion, write_motion
 from pathwalker_cli.results.run_folder import (
     ENTRIES,
     Run,

@@ -14,8 +14,8 @@ from click.testing import CliRunner
 
 from conftest import sketch
 from pathwalker_cli.cli import cli
-from pathwalker_cli.results.metrics import sha256
 from pathwalker_cli.gait.motion_file import read_motion, write_motion
+from pathwalker_cli.results.metrics import sha256
 from pathwalker_cli.studies.batch.ledger import numbers_of, read_metrics
 from pathwalker_cli.verification import checks
 from pathwalker_cli.verification.checks import Verification

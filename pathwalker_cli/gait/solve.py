@@ -336,12 +336,10 @@ class GaitSolver:
         for attempt in range(1, mesh.refinements + 1):
             if not result.converged or self._interrupted:
                 break
-            shares = self._cost_error(program, result).shares
-            allowed = mesh.cost_tolerance * abs(result.objective)
-            settled = sum(np.abs(part).sum() for part in shares) <= allowed
+            costly = self._costly(program, result)
+            settled = not any(part.any() for part in costly)
             if settled and _within(errors, mesh) and tolerance <= solver.tolerance:
                 break
-            costly = meshing.costly(shares, allowed * (1.0 if settled else choices.COST_AIM))
             share = choices.EAGER_SHARE if attempt >= choices.EAGER_ROUND else 1.0
             meshes = meshing.refined(program.meshes, errors, costly, mesh, share)
             start = program.to_motion(result.unknowns).resampled(meshes, mesh.degree)
@@ -371,7 +369,16 @@ class GaitSolver:
         self.seconds["verify"] += time.perf_counter() - began
         return errors
 
-    def _cost_error(self, program: CollocationProgram, result: NlpResult) -> CostError:
+    def _costly(self, program: CollocationProgram, result: NlpResult) -> tuple[np.ndarray, ...]:
+        """Return which intervals have to be split for the cost; none where it cannot be told."""
+        error = self._cost_error(program, result)
+        if error is None:
+            return tuple(np.zeros(len(mesh) - 1, bool) for mesh in program.meshes)
+        allowed = self.config.mesh.cost_tolerance * abs(result.objective)
+        size = sum(np.abs(part).sum() for part in error.shares)
+        return meshing.costly(error.shares, allowed * (choices.COST_AIM if size > allowed else 1.0))
+
+    def _cost_error(self, program: CollocationProgram, result: NlpResult) -> CostError | None:
         """Return what halving every interval would change the cost by, as estimated."""
         began = time.perf_counter()
         error = cost_error(program, result)
@@ -387,6 +394,7 @@ class GaitSolver:
         if self.shortfall is not None and self.shortfall.too_weak:
             status = TOO_WEAK
         motion = self.whole_stride(program, result)
+        error = self._cost_error(program, result) if result.converged else None
         return GaitSolution(
             case=self.case,
             walker=self.walker.with_parameters(motion.parameters),
@@ -399,7 +407,7 @@ class GaitSolver:
             violations=largest_violations(program, result),
             active=active_bounds(program, result),
             reintegration=errors,
-            cost_error=self._cost_error(program, result).total if result.converged else None,
+            cost_error=None if error is None else error.total,
             start=start,
             stages=tuple(self.stages),
             seconds=dict(self.seconds),

@@ -1,8 +1,8 @@
 """Several starts of one study: all local optima that they lead to, and the best of them.
 
 The problem is not convex; a start decides which optimum is found.  The first one is the study's
-own; where that is a typical walk, the others come next.  Further starts differ in crouch, step length,
-speed and stiffness, spread by a Latin hypercube.
+own; where that is a typical walk, the others come next.  Further starts differ in crouch, step
+length, speed and stiffness, spread by a Latin hypercube.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ References:
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -36,8 +36,17 @@ class CostError:
     shares: tuple[np.ndarray, ...]
 
 
-def cost_error(program: CollocationProgram, result: NlpResult) -> CostError:
-    """Return the estimate for an optimum."""
+_TRUSTED: Final = 0.1
+"""Largest share of the cost that is taken for a small correction."""
+
+
+def cost_error(program: CollocationProgram, result: NlpResult) -> CostError | None:
+    """Return the estimate for an optimum.
+
+    On the meshes of gaits it comes within a factor of two of what a solve finds, of a textbook
+    problem with a singular control within three.  None where the mesh is too coarse to tell: the
+    step is no small correction.
+    """
     meshes = tuple(_halved(mesh) for mesh in program.meshes)
     fine = CollocationProgram(program.blocks, program.numbers, meshes)
     motion = program.to_motion(result.unknowns).resampled(meshes, program.blocks.degree)
@@ -50,10 +59,13 @@ def cost_error(program: CollocationProgram, result: NlpResult) -> CostError:
     groups = np.concatenate([keys[:, 0] for keys in fine.elimination_keys])
     # two halves of an interval, each with a group for every point, one for its end and its node
     of = groups // (2 * (program.blocks.degree + 2))
+    total = float(sum(part.sum() for part in shares))
+    if not abs(total) <= _TRUSTED * abs(result.objective):
+        return None
     gained = np.bincount(of, np.concatenate(shares), minlength=sum(intervals))
     # what ties the ends together belongs to no interval
     each = np.split(gained[: sum(intervals)], np.cumsum(intervals)[:-1])
-    return CostError(float(gained.sum()), tuple(each))
+    return CostError(total, tuple(each))
 
 
 def _halved(mesh: np.ndarray) -> np.ndarray:

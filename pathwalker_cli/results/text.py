@@ -214,7 +214,7 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
 
 def _discretisation_text(solution: GaitSolution) -> str:
     if solution.cost_error is None:
-        return "not estimated"
+        return "not estimated: the mesh is too coarse to tell"
     share = 100.0 * solution.cost_error / abs(solution.cost)
     return f"halving all mesh intervals would change the cost by about {share:+.2g} %"
 
