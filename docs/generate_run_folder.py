@@ -121,6 +121,7 @@ PROOF: Final = {
     "largest_violation": "of all rows and bounds, in its own unit",
     "largest_violation_name": "which that is",
     "violations": "the largest ones, name and amount",
+    "cost_error": "estimated change of the cost if all mesh intervals were halved; null where the mesh is too coarse to tell",
     "reintegration_position_error": "largest error of an independent integrator at the next node [rad, m]",
     "reintegration_velocity_error": "the same for velocities [rad/s, m/s]",
     "second_engine_residual": "largest violation of the equation of motion in numeric Pinocchio [N, N m]",
