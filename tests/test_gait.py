@@ -174,8 +174,12 @@ def test_mesh_follows_durations_and_errors() -> None:
         tuple(np.array([0.0] * (len(m) - 2) + [0.1]) for m in meshes),
         tuple(np.zeros(len(m) - 1) for m in meshes),
     )
-    finer = meshing.refined(meshes, errors, MeshConfig())
+    cheap = tuple(np.zeros(len(mesh) - 1, bool) for mesh in meshes)
+    finer = meshing.refined(meshes, errors, cheap, MeshConfig())
     assert [len(mesh) - 1 for mesh in finer] == [13, 33, 6]
+    dear = (np.arange(10) < 2, *cheap[1:])
+    finer = meshing.refined(meshes, errors, dear, MeshConfig())
+    assert [len(mesh) - 1 for mesh in finer] == [15, 33, 6]
     assert all(np.all(np.diff(mesh) > 0) for mesh in finer)
 
 

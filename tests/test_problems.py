@@ -122,7 +122,8 @@ def test_one_step_gives_a_whole_symmetric_stride() -> None:
 
 
 def test_starts_are_spread_and_repeatable() -> None:
-    config = smoke_version(load_config("mapd-orthosis", changes=("starts=4", "start.seed=7")))
+    changes = ("starts=4", "start.seed=7", "start.gait=synthetic")
+    config = smoke_version(load_config("mapd-orthosis", changes=changes))
     solver = GaitSolver(Case.of(config))
     studies = [case.config for case in spread_starts(solver)]
     assert studies == [case.config for case in spread_starts(solver)]
@@ -136,6 +137,13 @@ def test_starts_are_spread_and_repeatable() -> None:
     assert len({round(study.start.knee_flexion, 6) for study in studies}) == len(studies)
     solver.case = solver.case.with_values({"start.seed": 8})
     assert spread_starts(solver)[1].config != studies[1]
+
+
+def test_the_other_typical_walks_come_before_the_spread() -> None:
+    case = load_case("mapd-orthosis", changes=("starts=5",))
+    starts = [each.config.start for each in spread_starts(GaitSolver(case))]
+    kinds = [(start.gait, start.walk) for start in starts]
+    assert kinds == [("typical", 0), ("typical", 1), ("typical", 2), *2 * [("synthetic", 0)]]
 
 
 def test_shooting_solves_predictions_only() -> None:

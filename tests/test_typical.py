@@ -29,9 +29,7 @@ def stride() -> tuple[Walker, PhasedMotion]:
 
 def walk_of(walker: Walker, motion: PhasedMotion) -> TypicalWalk:
     """Return the walk of a walker itself."""
-    return TypicalWalk(
-        "own", motion, walker.leg_length, walker.weight, walker.max_isometric_torque
-    )
+    return TypicalWalk("own", motion, walker.leg_length, walker.weight, walker.max_isometric_torque)
 
 
 def test_a_walk_is_itself_for_its_own_child(stride: tuple[Walker, PhasedMotion]) -> None:

@@ -43,9 +43,8 @@ _TRUSTED: Final = 0.1
 def cost_error(program: CollocationProgram, result: NlpResult) -> CostError | None:
     """Return the estimate for an optimum.
 
-    On the meshes of gaits it comes within a factor of two of what a solve finds, of a textbook
-    problem with a singular control within three.  None where the mesh is too coarse to tell: the
-    step is no small correction.
+    It comes within a factor of about two of what a solve finds, where a control is singular within
+    three (tests).  None where the mesh is too coarse to tell: the step is no small correction.
     """
     meshes = tuple(_halved(mesh) for mesh in program.meshes)
     fine = CollocationProgram(program.blocks, program.numbers, meshes)

@@ -65,7 +65,6 @@ class Seen:
                 for side, knee in knees.items()
             )
             values["bounds.joint_ranges"] = f"{{{ranges}}}"
-            values["start.knee_flexion"] = f"{np.mean(self.knee_flexion):.3f}"
         if self.examination:
             values["model"] = ""
             values["model.tissue"] = "true"
