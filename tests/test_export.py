@@ -17,6 +17,7 @@ from conftest import MadeSolution
 from helpers import stylised_series
 from opensim_peer import opensim_says, read_opensim, with_opensim
 from pathwalker_cli.cli import cli
+from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Condition
 from pathwalker_cli.export.files import write_export
 from pathwalker_cli.model.contact import Feet
@@ -33,6 +34,10 @@ PLAIN = {"motion.mot", "ground_forces.mot", "torques.sto", "points.trc"}
 MODEL = {
     "model.osim", "states.sto", "controls.sto", "external_loads.xml", "inverse_dynamics.xml",
 }  # fmt: skip
+RUNS = (
+    "ls-barefoot", "mapd-barefoot", "mapd-orthosis", "mapd-ws-orthosis", "mapd-healthy",
+    "predict-barefoot", "predict-orthosis",
+)  # fmt: skip
 WALKERS: list[tuple[Condition, Feet, bool]] = [
     ("barefoot", "points", False),
     ("orthosis", "points", False),
@@ -85,6 +90,25 @@ def test_opensim_finds_our_torques_and_accelerations(
     said = opensim_says(tmp_path)
     assert len(said["torques"]) == len(COORDINATES)
     assert max(said["torques"].values()) < 1e-6
+    assert said["accelerations"] < 1e-5 * said["largest acceleration"]
+
+
+@with_opensim
+@pytest.mark.slow
+@pytest.mark.parametrize("config", RUNS)
+def test_opensim_finds_the_torques_of_shipped_problems(
+    config: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    run, out = str(tmp_path / "run"), tmp_path / "out"
+    for words in (
+        ["solve", load_config(config).problem, config, "--out", run, "--set", "verdict=false"],
+        ["export", run, "-o", str(out), "--opensim"],
+    ):
+        result = CliRunner().invoke(cli, words)
+        assert result.exit_code == 0, result.output
+    said = opensim_says(out)
+    assert max(said["torques"].values()) < 1e-3, "[N m], at the pelvis [N] too"
     assert said["accelerations"] < 1e-5 * said["largest acceleration"]
 
 
