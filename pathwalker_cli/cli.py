@@ -49,6 +49,10 @@ COMMANDS: Final[dict[str, tuple[str, str]]] = {
     "explore": ("explore", "Turn the numbers of a run on a page and see how the walk changes."),
     "view": ("pages", "Show the stride of a run in 3D."),
     "model": ("model", "Write the walking model of a patient as a URDF."),
+    "export": (
+        "export",
+        "Write a run for other programs: tables, or an OpenSim model with its set-up.",
+    ),
     "import": ("recorded", "Turn C3D files into joint angles, events and forces."),
     "ik": ("recorded", "Compute joint angles from the markers of C3D files."),
     "id": ("recorded", "Compute joint torques and muscle strengths from recorded gait."),
@@ -73,7 +77,16 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Predict": ("solve", "batch", "reproduce"),
     "Springs and certainty": tuple(STUDIES),
     "Recorded gait": ("import", "ik", "id"),
-    "Look and compare": ("report", "animate", "explore", "view", "compare", "evaluate", "model"),
+    "Look and compare": (
+        "report",
+        "animate",
+        "explore",
+        "view",
+        "compare",
+        "evaluate",
+        "model",
+        "export",
+    ),
     "Prove": ("verify", "rerun"),
     "Set up": ("init", "check", "doctor", "completion"),
 }

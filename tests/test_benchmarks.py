@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 import subprocess
@@ -12,6 +13,8 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+
+from opensim_peer import with_opensim
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 IPOPT = """
@@ -143,3 +146,16 @@ def test_goals_say_what_is_met(load: Any) -> None:
     assert rows["one iteration on 64 intervals, the slower problem"] == ["0.06", "CPU s", "no"]
     assert rows["peak memory of any process (y)"] == ["2,000", "MB", "no"]
     assert rows["pathwalker --help"] == ["not measured", "CPU s", "-"]
+
+
+@with_opensim
+def test_a_peer_gets_our_step(load: Any, tmp_path: Path) -> None:
+    """Moco reads the model, the start and the bounds, iterates, and is integrated anew."""
+    load("peers").write_step(tmp_path, argparse.Namespace(intervals=3, iterations=1))
+    words = [sys.executable, BENCHMARKS / "parts" / "moco.py", tmp_path]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Total number of variables" in done.stdout
+    found = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert (found["status"], found["iterations"]) == ("Maximum_Iterations_Exceeded", 1)
+    assert all(math.isfinite(x) and x > 0 for x in found.values() if isinstance(x, float))

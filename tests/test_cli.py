@@ -19,6 +19,7 @@ from click.testing import CliRunner, Result
 from rich.console import Console
 
 from helpers import walker_of
+from opensim_peer import opensim_says, with_opensim
 from pathwalker_cli import __version__
 from pathwalker_cli.cli import COMMANDS, cli
 from pathwalker_cli.commands import doctor
@@ -605,6 +606,17 @@ def test_the_smoke_motion_gives_the_same_metrics_again(smoke: Smoke) -> None:
     loaded = load_run(smoke[0])
     again = metrics_of(stride_of(gait_series(walker_of("orthosis"), loaded.motion)))
     assert json.loads(json.dumps(again)) == {key: loaded.metrics[key] for key in again}
+
+
+@with_opensim
+@pytest.mark.xdist_group("smoke")
+def test_opensim_finds_the_torques_of_the_smoke_solve(smoke: Smoke, tmp_path: Path) -> None:
+    assert run("export", smoke[0], "-o", tmp_path, "--opensim").exit_code == 0
+    said = opensim_says(tmp_path)
+    assert max(said["torques"].values()) < 1e-3, "[N m], at the pelvis [N] too"
+    assert said["accelerations"] < 1e-5 * said["largest acceleration"]
+    by_tool = said["tool, median"]  # it differentiates the angles of a coarse mesh
+    assert max(value for name, value in by_tool.items() if not name.startswith("pelvis")) < 1.0
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from opensim_tables import read_opensim
+from opensim_peer import read_opensim
 from pathwalker_cli.cli import cli
 from pathwalker_cli.inverse.laboratory import angles, differences, moments
 from pathwalker_cli.inverse.trial import Trial

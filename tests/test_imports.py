@@ -37,7 +37,16 @@ LAYERS = (
     {"results"},
     {"evaluation"},
     {"studies"},
-    {"reproduce", "report", "animation", "explore", "starter", "checking", "verification"},
+    {
+        "reproduce",
+        "report",
+        "animation",
+        "explore",
+        "export",
+        "starter",
+        "checking",
+        "verification",
+    },
     {"commands"},
     {"cli"},
 )

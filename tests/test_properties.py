@@ -34,7 +34,7 @@ from made_patients import (
     rows_of,
     similar,
 )
-from opensim_tables import read_opensim
+from opensim_peer import read_opensim
 from pathwalker_cli.case import Case, config_text
 from pathwalker_cli.config import load_config
 from pathwalker_cli.conventions import (

@@ -16,7 +16,7 @@ import yaml
 from click.testing import CliRunner, Result
 
 from made_c3d import cut, folder, motion, text, write_c3d
-from opensim_tables import read_opensim
+from opensim_peer import read_opensim
 from pathwalker_cli.commands.recorded import id_command, ik_command, import_command
 from pathwalker_cli.errors import ConfigError, DataError, InputError
 from pathwalker_cli.inverse.figures import joint_torque_figure, save_recorded_figures

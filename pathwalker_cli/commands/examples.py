@@ -41,6 +41,8 @@ pathwalker tradeoff tradeoff --run runs/mapd-orthosis
 pathwalker tradeoff tradeoff --set base=mapd-barefoot
 pathwalker model sreenivasa2017-patient --condition orthosis -o walker.urdf
 pathwalker model my-child --condition barefoot
+pathwalker export runs/mapd-orthosis -o exported
+pathwalker export runs/mapd-orthosis -o opensim --opensim
 pathwalker import c3d/ --patient my-child --condition barefoot -o angles
 pathwalker import walk-1.c3d --patient my-child --condition orthosis -o out
 pathwalker ik inverse-kinematics --set 'c3d.barefoot=[c3d/]'

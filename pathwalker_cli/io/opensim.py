@@ -42,12 +42,13 @@ def write_opensim(path: str | Path, table: Trajectory, digits: int = 8) -> None:
 def force_table(forces: Trajectory) -> Trajectory:
     """Return ground forces in OpenSim's columns and axes.
 
-    Per foot force `ground_force_r_vx`, point of application `ground_force_r_px` (y = 0, z = 0: the
+    Per foot force `ground_force_r_vx`, point of application `ground_force_r_px` (z = 0: the
     walker is flat) and free moment `ground_torque_r_x` (zero) with their y and z.  Forces that were
     not measured stay NaN; the point of a foot without load is 0.
 
     Args:
-        forces: Columns force_r_x [N], force_r_z [N], cop_r_x [m] and the same on the left.
+        forces: Columns force_r_x [N], force_r_z [N], cop_r_x [m] and the same on the left; cop_r_z
+            [m] if points may lie off the floor.
     """
     names: list[str] = []
     columns: list[np.ndarray] = []
@@ -57,8 +58,11 @@ def force_table(forces: Trajectory) -> Trajectory:
         forward, up = forces[f"force_{foot}_x"], forces[f"force_{foot}_z"]
         for stem in (f"force_{foot}_v", f"force_{foot}_p", f"torque_{foot}_"):
             names += [f"ground_{stem}{axis}" for axis in "xyz"]
-        point = np.where(up == 0.0, 0.0, forces[f"cop_{foot}_x"])
-        columns += [forward, up, zero, point, *[zero] * 5]
+        point, height = (
+            np.where(up == 0.0, 0.0, forces[name]) if name in forces.names else zero
+            for name in (f"cop_{foot}_x", f"cop_{foot}_z")
+        )
+        columns += [forward, up, zero, point, height, *[zero] * 4]
     units = ("N", "N", "N", "m", "m", "m", "N m", "N m", "N m") * 2
     return Trajectory(forces.time, tuple(names), np.column_stack(columns), units)
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from itertools import pairwise
 from typing import Any
 
 import casadi as ca
@@ -90,6 +91,19 @@ def evaluate(chain: BezierChain, x: Any) -> BezierPoint:
         return BezierPoint(*_function(chain).call([x], True, False))
     edges, pieces = _table(chain)
     return _evaluated(chain, pieces[:, edges.searchsorted(x, "right")], x)
+
+
+def samples(chain: BezierChain, count: int) -> np.ndarray:
+    """Return positions along a chain of numbers, `count` in each piece and the last knot.
+
+    They are even in the curve parameter: dense where the curve bends.
+    """
+    parameter = np.linspace(0.0, 1.0, count, endpoint=False)
+    places = [
+        x0 + (x1 - x0) * _bernstein(parameter, 0, *chain.controls(i), 1)[0]
+        for i, (x0, x1) in enumerate(pairwise(chain.x))
+    ]
+    return np.append(np.concatenate(places), chain.x[-1])
 
 
 def _pieces(chain: BezierChain) -> list[list[Any]]:
