@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, Literal
 
@@ -116,10 +117,19 @@ def summary_rows(
 
 
 def _landing(metrics: Mapping[str, Any], side: str) -> str:
-    """Return what of a foot lands first, and where between heel and toe."""
-    index = metrics[f"strike_index_{side}"]
-    part = "rearfoot" if index < 1 / 3 else "midfoot" if index < 2 / 3 else "forefoot"
-    return f"{side} {part} ({100 * index:.0f} % of heel to toe)"
+    """Return what of a foot lands first, where between heel and toe, and how it goes on."""
+    index, rearmost = metrics[f"strike_index_{side}"], metrics[f"rearmost_pressure_{side}"]
+    part, use = next(words for limit, *words in _LANDINGS if index < limit)
+    use = "on the toes" if rearmost > 2 / 3 else use
+    return f"{side} {part} ({100 * index:.0f} % of heel to toe): {use}"
+
+
+_LANDINGS: Final = (
+    (1 / 3, "rearfoot", "heel to toe"),
+    (2 / 3, "midfoot", "flat"),
+    (math.inf, "forefoot", "toe to heel"),
+)
+"""Strike indices below which a foot lands with a part of it, and how it goes on."""
 
 
 def _cuff(metrics: Mapping[str, Any], side: str) -> str:
@@ -222,7 +232,9 @@ def _discretisation_text(solution: GaitSolution) -> str:
 def _balance_text(found: Mapping[str, float]) -> str:
     energy = f"{found['energy']:.1e} J of {found['work_scale']:.3g} J"
     momentum = f"{found['impulse']:.1e} N s of {found['impulse_scale']:.3g} N s"
-    return f"work and energy within {energy}, forces and momentum within {momentum}"
+    text = f"work and energy within {energy}, forces and momentum within {momentum}"
+    lost = found["ground_loss"]
+    return f"{text}; the ground takes up {lost:.2g} J" if lost > 0.0 else text
 
 
 def _words(name: str) -> str:
