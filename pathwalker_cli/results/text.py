@@ -120,7 +120,7 @@ def _landing(metrics: Mapping[str, Any], side: str) -> str:
     """Return what of a foot lands first, where between heel and toe, and how it goes on."""
     index, rearmost = metrics[f"strike_index_{side}"], metrics[f"rearmost_pressure_{side}"]
     part, use = next(words for limit, *words in _LANDINGS if index < limit)
-    use = "on the toes" if rearmost > 2 / 3 else use
+    use = "on the toes" if (rearmost or 0.0) > 2 / 3 else use
     return f"{side} {part} ({100 * index:.0f} % of heel to toe): {use}"
 
 

@@ -164,9 +164,14 @@ def _strike_index(stride: Stride, side: Side) -> float:
 
 
 def _rearmost_pressure(stride: Stride, side: Side) -> float:
-    """Return how near to the heel (0) from the toe (1) the centre of pressure of a side gets."""
+    """Return how near to the heel (0) from the toe (1) the centre of pressure of a side gets.
+
+    NaN if the foot is never loaded.
+    """
     walker, first = stride.walker, 2 * SIDES.index(side)
     at = np.flatnonzero(stride.foot_force(side)[:, 1] > LOADED_SHARE * walker.weight)
+    if not at.size:
+        return np.nan
     rows = walker.pattern.rows(side)
     load = stride.known("point_force")[at, 1::2][:, rows]
     centre = (load * stride.contact_position[at][:, rows, 0]).sum(axis=1) / load.sum(axis=1)

@@ -328,10 +328,12 @@ def stances_of(series: GaitSeries) -> dict[Side, tuple[float, float]]:
         order = np.argsort(since, kind="stable")
         load = series.vertical_force(side)[order]
         rising = np.flatnonzero((load[:-1] <= LOADED) & (load[1:] > LOADED))
-        last = int(rising[-1])
-        share = (LOADED - load[last]) / (load[last + 1] - load[last])
-        begin, end = since[order][last : last + 2]
-        strike = (toe_off + begin + share * (end - begin)) % duration
+        strike = toe_off % duration  # a foot that never lifts, as in an iterate that is no solution
+        if rising.size:
+            last = int(rising[-1])
+            share = (LOADED - load[last]) / (load[last + 1] - load[last])
+            begin, end = since[order][last : last + 2]
+            strike = (toe_off + begin + share * (end - begin)) % duration
         found[side] = strike, toe_off if toe_off > strike else toe_off + duration
     return found
 
