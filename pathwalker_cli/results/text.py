@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, Literal
 
@@ -117,19 +116,11 @@ def summary_rows(
 
 
 def _landing(metrics: Mapping[str, Any], side: str) -> str:
-    """Return what of a foot lands first, where between heel and toe, and how it goes on."""
+    """Return what of a foot lands first, where between heel and toe, and whether it stays there."""
     index, rearmost = metrics[f"strike_index_{side}"], metrics[f"rearmost_pressure_{side}"]
-    part, use = next(words for limit, *words in _LANDINGS if index < limit)
-    use = "on the toes" if (rearmost or 0.0) > 2 / 3 else use
-    return f"{side} {part} ({100 * index:.0f} % of heel to toe): {use}"
-
-
-_LANDINGS: Final = (
-    (1 / 3, "rearfoot", "heel to toe"),
-    (2 / 3, "midfoot", "flat"),
-    (math.inf, "forefoot", "toe to heel"),
-)
-"""Strike indices below which a foot lands with a part of it, and how it goes on."""
+    part = "rearfoot" if index < 1 / 3 else "midfoot" if index < 2 / 3 else "forefoot"
+    stays = ", walks on the toes" if (rearmost or 0.0) > 2 / 3 else ""
+    return f"{side} {part} ({100 * index:.0f} % of heel to toe){stays}"
 
 
 def _cuff(metrics: Mapping[str, Any], side: str) -> str:
