@@ -172,9 +172,9 @@ class Stride(Sampled):
         """Whether each place of the walker's pattern is on the ground, shape (n, k).
 
         Raises:
-            NotKnownError: If phases or forces are not known.
+            NotKnownError: If phases are not known.
         """
-        return contacts(self.walker, tuple(self.known("phase")), self.known("point_force"))
+        return contacts(self.walker, tuple(self.known("phase")), self.point_force)
 
     @cached_property
     def weights(self) -> np.ndarray:
@@ -368,7 +368,7 @@ def own_cycle(series: GaitSeries, side: Side) -> OwnCycle:
     return OwnCycle(side, index, percent, 100.0 * ((toe_off - strike) % duration) / duration)
 
 
-def contacts(walker: Walker, phase: tuple[str, ...], force: np.ndarray) -> np.ndarray:
+def contacts(walker: Walker, phase: tuple[str, ...], force: np.ndarray | None) -> np.ndarray:
     """Return whether each place of the pattern is on the ground at n instants, (n, k).
 
     The phase of each tells it; what gives way is on the ground where it is loaded.
@@ -376,9 +376,9 @@ def contacts(walker: Walker, phase: tuple[str, ...], force: np.ndarray) -> np.nd
     Args:
         walker: Who walks.
         phase: Name of the phase at each instant.
-        force: Forces in the order of the pattern [N], shape (n, 2 k).
+        force: Forces in the order of the pattern [N], shape (n, 2 k); needed of what gives way.
     """
-    if walker.parts.compliant:
+    if walker.parts.compliant and force is not None:
         return np.asarray(force[:, 1::2] > LOADED)
     points = {name: phase_named(name).points for name in set(phase)}
     return np.array([[point in points[name] for point in walker.pattern.points] for name in phase])
