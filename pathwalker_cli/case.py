@@ -85,7 +85,8 @@ class Case:
         from pathwalker_cli.model.walker import walker_of  # takes long: only who needs it
 
         free = tuple(self.config.free)
-        return walker_of(self.patient, self.parts, self.config.model.published, backend, free)
+        model, friction = self.config.model, self.config.bounds.friction
+        return walker_of(self.patient, self.parts, model.published, backend, free, friction)
 
     def with_values(self, values: Mapping[str, Any], where: str = "") -> Case:
         """Return the case with other values in its config; see `config.with_values`.

@@ -98,7 +98,7 @@ def pose(seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 def dynamics(walker: Walker, q: np.ndarray, v: np.ndarray) -> list[np.ndarray]:
     """Return mass matrix, bias, Jacobian of the contact points and their drift."""
-    mass, bias, jacobian, drift = map(np.asarray, walker.dynamics_terms(q, v))
+    mass, bias, jacobian, drift, _ = map(np.asarray, walker.dynamics_terms(q, v))
     return [mass, bias.ravel(), jacobian, drift.ravel()]
 
 

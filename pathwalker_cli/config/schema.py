@@ -13,9 +13,11 @@ from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.gait.costs import ELSEWHERE, GOALS, Costs
 from pathwalker_cli.installed import load_installed
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
+from pathwalker_cli.model.choices import FRICTION
 from pathwalker_cli.model.contact import (
     HEEL_TOE,
     PHASE_NAMES,
+    SOLES,
     Contact,
     ContactPattern,
     Feet,
@@ -102,7 +104,7 @@ class ModelConfig(YamlModel):
 
     @model_validator(mode="after")
     def _rolling(self) -> ModelConfig:
-        if self.feet == "sole" and self.uses != HEEL_TOE:
+        if self.feet in SOLES and self.uses != HEEL_TOE:
             raise invalid(
                 "gives model.contact for feet with soles, which roll over whatever they land on",
                 mend="leave contact out, or set feet to rockers",
@@ -191,7 +193,7 @@ class BoundsConfig(YamlModel):
     stiffness: Annotated[dict[str, StiffnessRange], _keys_of(STIFFNESSES)] = Field(
         default_factory=dict
     )
-    friction: Annotated[float, Quantity("", 0.05, 2.0)] = 0.8
+    friction: Annotated[float, Quantity("", 0.05, 2.0)] = FRICTION
     least_vertical_force: Annotated[float, Quantity("N", 0.0, 50.0)] = 0.0
     least_height: Annotated[float, Quantity("m", -0.02, 0.0)] = -1e-3
 
@@ -314,11 +316,22 @@ class StudyConfig(YamlModel):
                 f"bounds the phase {strangers[0]}, which these feet do not have",
                 allowed=", ".join(names),
             )
-        if self.model.feet == "sole" and self.cost.goals.get("centre_of_pressure"):
+        if self.model.feet in SOLES and self.cost.goals.get("centre_of_pressure"):
             raise invalid(
                 "weighs the goal 'centre_of_pressure', which needs heel and toe: a sole rolls",
                 mend="leave the goal out, or set model.feet to points or rockers",
             )
+        if self.model.feet == "compliant":
+            if self.fits:
+                raise invalid(
+                    f"asks {self.problem} for feet that give way; it follows phases",
+                    allowed="model.feet points, rockers or sole",
+                )
+            if self.transcription != "collocation":
+                raise invalid(
+                    f"asks for {self.transcription} of feet that give way, too quick for its steps",
+                    mend="set transcription to collocation, or model.feet to sole",
+                )
         return self
 
     @model_validator(mode="after")

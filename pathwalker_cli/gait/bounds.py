@@ -13,6 +13,7 @@ from pathwalker_cli.conventions import ANGLES, COORDINATES, GRAVITY, ROOT
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.problem import ACTIVATIONS, RESERVES, VELOCITIES
+from pathwalker_cli.io.c3d_plates import LOADED
 from pathwalker_cli.io.fields import quantity_at
 from pathwalker_cli.model.contact import ContactPattern
 from pathwalker_cli.model.numbers import Unknown
@@ -69,13 +70,19 @@ def gait_bounds(
     entries |= _each(VELOCITIES, (-config.joint_speed, config.joint_speed))
     pattern = walker.pattern
     for phase in pattern.phases:
-        pair = config.phase_durations.get(phase.name, config.phase_duration)
+        shortest, longest = config.phase_duration
+        usual = (shortest, 2.0 * longest) if phase.compliant else (shortest, longest)
+        pair = config.phase_durations.get(phase.name, usual)
         entries[("duration", phase.name)] = pair
         sources[f"duration of {phase.name}"] = f"[{pair[0]:g}, {pair[1]:g}] s, from the config"
-    loads = (force.name for force in pattern.forces if force.bears)
-    entries |= _each(loads, (config.least_vertical_force, INFINITY))
-    entries |= _each((f"{p.name} height" for p in pattern.points), (config.least_height, INFINITY))
-    entries |= _lift_off(pattern)
+    if walker.parts.compliant:
+        entries |= _toe_off(pattern)
+    else:
+        loads = (force.name for force in pattern.forces if force.bears)
+        entries |= _each(loads, (config.least_vertical_force, INFINITY))
+        heights = (f"{point.name} height" for point in pattern.points)
+        entries |= _each(heights, (config.least_height, INFINITY))
+        entries |= _lift_off(pattern)
     entries[("distance",)] = config.distance
     entries[("walking_speed",)] = (_least_speed(walker, config, sources), INFINITY)
     ranges, keys = _unknowns(walker, config, free, sources)
@@ -141,6 +148,16 @@ def _lift_off(pattern: ContactPattern) -> Entries:
         (force.name, phase.name, "end"): (0.0, 0.0)
         for phase, after in zip(pattern.phases, pattern.following, strict=True)
         for force in phase.lifted_off(after)
+    }
+
+
+def _toe_off(pattern: ContactPattern) -> Entries:
+    """Return the force at the last instant of each step, where its foot counts as lifted."""
+    return {
+        (force.name, phase.name, "end"): (LOADED, LOADED)
+        for phase in pattern.phases
+        for force in phase.forces
+        if force.bears and force.point.side == phase.step
     }
 
 

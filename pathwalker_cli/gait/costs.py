@@ -15,6 +15,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, LEG_JOINTS, SUFFIX
 from pathwalker_cli.gait import choices
+from pathwalker_cli.io.c3d_plates import LOADED
 from pathwalker_cli.model.contact import ContactPhase
 from pathwalker_cli.model.skeleton import SIDES
 
@@ -64,9 +65,16 @@ class Instant:
     data: Sequence[Any] = ()
 
     @property
-    def stance(self) -> tuple[str, ...]:
-        """Suffixes of the feet on the ground."""
-        return tuple(sorted(SUFFIX[side] for side in self.phase.feet))
+    def standing(self) -> dict[str, Any]:
+        """How far each foot stands by its suffix: 1 on the ground, 0 in the air.
+
+        What gives way passes from one to the other around the force from which a foot is loaded.
+        """
+        if not self.phase.compliant:
+            return {SUFFIX[side]: float(side in self.phase.feet) for side in SIDES}
+        pairs = zip(self.phase.forces, self.force, strict=True)
+        loads = {SUFFIX[f.point.side]: value**2 for f, value in pairs if f.bears}
+        return {side: load / (load + LOADED**2) for side, load in loads.items()}
 
     @property
     def vertical_force(self) -> dict[str, Any]:
@@ -196,7 +204,8 @@ sum over recorded instants of (q - q_recorded)^2."""
 
 
 def _crouch(point: Instant) -> tuple[Any, ...]:
-    return (sum(point.angle(f"knee_{side}") ** 2 for side in point.stance),)
+    knees = (on * point.angle(f"knee_{side}") ** 2 for side, on in point.standing.items())
+    return (sum(knees),)
 
 
 def _asymmetry(point: Instant) -> tuple[Any, ...]:
@@ -263,14 +272,20 @@ def _trunk_lean(point: Instant) -> tuple[Any, ...]:
 
 
 def _foot_pitch(point: Instant) -> tuple[Any, ...]:
-    swinging = (side for side in "rl" if side not in point.stance)
-    chain = [("pelvis_tilt", *(f"{joint}_{side}" for joint in LEG_JOINTS)) for side in swinging]
-    return (sum((sum(map(point.angle, names)) ** 2 for names in chain), 0.0 * point.q[0]),)
+    cost = 0.0 * point.q[0]
+    for side, on in point.standing.items():
+        chain = ("pelvis_tilt", *(f"{joint}_{side}" for joint in LEG_JOINTS))
+        cost = cost + (1.0 - on) * sum(map(point.angle, chain)) ** 2
+    return (cost,)
 
 
 def _stumbling(point: Instant) -> tuple[Any, ...]:
-    pairs = zip(point.heights, point.speeds, strict=True)
-    near = (speed**2 / (1.0 + (h / choices.NEAR_GROUND) ** 2) ** 2 for h, speed in pairs)
+    count = len(point.heights)
+    swings = (
+        [1.0 - on for on in point.standing.values()] if point.phase.compliant else [1.0] * count
+    )
+    places = zip(point.heights, point.speeds, swings, strict=True)
+    near = (s * v**2 / (1.0 + (h / choices.NEAR_GROUND) ** 2) ** 2 for h, v, s in places)
     return (sum(near, 0.0 * point.q[0]),)
 
 

@@ -23,6 +23,7 @@ from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.boundary import gait_boundary
 from pathwalker_cli.gait.costs import SHIPPED, Costs, Instant, Weights
+from pathwalker_cli.model.compliance import ground_force
 from pathwalker_cli.model.contact import ContactForce, ContactPhase
 from pathwalker_cli.model.elements import REGISTERED, element_forces, generalised_forces
 from pathwalker_cli.model.elements.muscle import (
@@ -62,7 +63,7 @@ class _Constants:
         self._walker, self._costs = walker, costs
         self.theta = ca.SX.sym("theta", len(walker.rigid_body.parameter_names))
         self.numbers = {number.address: ca.SX.sym(number.full_name) for number in walker.numbers}
-        self.friction = ca.SX.sym("friction")
+        self.friction, self.weight = ca.SX.sym("friction"), ca.SX.sym("weight")
         self.weights = ca.SX.sym("weights", len(costs.weighed))
         self.cost_numbers = ca.SX.sym("cost_numbers", costs.size)
         self.moving = tuple(u for u in walker.unknowns if walker.moves_bodies(u))
@@ -71,8 +72,9 @@ class _Constants:
     @property
     def vector(self) -> ca.SX:
         """All constants, one after the other."""
-        numbers, rest = self.numbers.values(), (self.friction, self.weights, self.cost_numbers)
-        return ca.vertcat(self.theta, *numbers, *rest, *self.slopes)
+        numbers, ground = self.numbers.values(), (self.friction, self.weight)
+        rest = self.weights, self.cost_numbers
+        return ca.vertcat(self.theta, *numbers, *ground, *rest, *self.slopes)
 
     def values(self, weights: Weights, friction: float, share: float) -> np.ndarray:
         """Return the values in the order of `vector`; of what is faded only a share acts."""
@@ -82,7 +84,7 @@ class _Constants:
             [
                 walker.rigid_body.parameters,
                 numbers,
-                [friction],
+                [friction, walker.weight],
                 [weights.get(name, 0.0) for name in costs.weighed],
                 costs.numbers(walker),
                 *map(walker.body_slopes, self.moving),
@@ -220,19 +222,22 @@ class GaitProblem:
         z = Variables.make("z", names, np.repeat(sizes, counts))
         vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
         _, tau, frozen = self._torques
+        position, velocity, acceleration = self._point_motion(vdot)
         jacobian = self._of(body.point_jacobian(self.q, theta), contact.forces)
         balance = body.inverse_dynamics(self.q, self.v, vdot, theta) - tau - reserve
         balance -= jacobian.T @ force
-        position, velocity, acceleration = self._point_motion(vdot)
         equations = tuple(f"{name} equation of motion" for name in COORDINATES)
-        still = "{0.name} contact acceleration"
+        if contact.compliant:
+            given, what = force - self._ground_forces(position, velocity), "{0.name} force"
+        else:
+            given, what = acceleration, "{0.name} contact acceleration"
         return Phase(
             name=contact.name,
             algebraic=z,
             derivative=ca.vertcat(self.v, vdot),
             residual=Rows.join(
                 Rows.make(balance, equations, choices.FORCE_SIZE),
-                self._rows(acceleration, contact.forces, still, choices.FORCE_SIZE),
+                self._rows(given, contact.forces, what, choices.FORCE_SIZE),
             ),
             path=self._path(contact, force, position),
             end=self._touch_down(contact.touched_down(following), position, velocity, acceleration),
@@ -249,6 +254,17 @@ class GaitProblem:
             body.point_velocities(q, v, theta),
             body.point_accelerations(q, v, vdot, theta),
         )
+
+    def _ground_forces(self, position: ca.SX, velocity: ca.SX) -> ca.SX:
+        """Return the forces on soles that give way, in the order of the pattern [N]."""
+        constants = self.constants
+        known = {**constants.numbers, **self._free}, constants.weight, constants.friction
+        at, moved = ca.vertsplit(position), ca.vertsplit(velocity)
+        forces = (
+            ground_force(place, at[2 * i + 1], (moved[2 * i], moved[2 * i + 1]), *known)
+            for i, place in enumerate(self.pattern.points)
+        )
+        return ca.vertcat(*(component for pair in forces for component in pair))
 
     def _integrands(
         self,
@@ -280,7 +296,12 @@ class GaitProblem:
         return dict(zip(self.costs.weighed, ca.vertsplit(self.constants.weights), strict=True))
 
     def _path(self, contact: ContactPhase, force: ca.SX, position: ca.SX) -> Rows:
-        """Return heights of the points in the air and the friction cones of the loaded feet."""
+        """Return heights of the points in the air and the friction cones of the loaded feet.
+
+        What gives way needs neither: its force says both.
+        """
+        if contact.compliant:
+            return Rows()
         places = [self.pattern.points[i] for i in self.pattern.in_the_air(contact)]
         airborne = [ContactForce(place, "z") for place in places]
         height = "{0.point.name} height"

@@ -30,6 +30,7 @@ from pathwalker_cli.gait.recorded import (
     recorded_stride,
     start_recording,
 )
+from pathwalker_cli.gait.sinking import sunk
 from pathwalker_cli.gait.solution import (
     TOO_WEAK,
     GaitSolution,
@@ -239,17 +240,21 @@ class GaitSolver:
     def _typical_motion(self, walk: TypicalWalk) -> PhasedMotion:
         """Return a typical walk on the first mesh, scaled to the walker."""
         motion, mesh = walk.scaled(self.walker, self.parameter_guess()), self.config.mesh
+        if self.walker.parts.compliant:
+            motion = sunk(self.walker, motion)
         motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])
         motion = with_goal_costs(motion, self.gait.costs, self.walker)
         return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
 
     def _from_stride(self, tolerance: float) -> tuple[str, Stage]:
         """Predict on the first mesh from the config's stride, which is tracked first."""
+        settings = self.settings(tolerance, self.config.solver.first_barrier)
+        if self.walker.parts.compliant:
+            return self.stride.name, self._on_first_mesh(self._tracked_on_soles(), settings)
         program, result = self._track()
         if not self._interrupted:
             motion = program.to_motion(result.unknowns)
             motion = replace(motion, parameters=self.parameter_guess())
-            settings = self.settings(tolerance, self.config.solver.first_barrier)
             program, result = self._on_first_mesh(motion, settings)
         return self.stride.name, (program, result)
 
@@ -306,6 +311,30 @@ class GaitSolver:
         motion = program.to_motion(result.unknowns)
         return full_stride(motion) if self.config.half_cycle else motion
 
+    def _tracked_on_soles(self) -> PhasedMotion:
+        """Follow the stride of the start on soles that roll; return it sunk into the ground.
+
+        Raises:
+            KeyboardInterrupt: If the user stops it: there is no iterate of this problem yet.
+        """
+        config, mesh = self.config, self.config.mesh
+        law = {n.place for point in self.walker.pattern.points for n in point.law}
+        intervals = mesh.intervals if isinstance(mesh.intervals, int) else sum(mesh.intervals)
+        values = {
+            "model.feet": "sole",
+            "mesh.intervals": intervals,
+            "bounds.phase_durations": {},
+            "free": {a: pair for a, pair in config.free.items() if a.partition(".")[0] not in law},
+        }
+        case = self.case.with_values(values)
+        rolling = GaitSolver(case, self.observer, self.stages, self.seconds)
+        program, result = rolling._track()
+        if self._interrupted:
+            raise KeyboardInterrupt
+        motion = sunk(self.walker, program.to_motion(result.unknowns))
+        motion = replace(motion, parameters=self.parameter_guess())
+        return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
+
     def _track(self) -> Stage:
         """Follow the stride of the start with reserve forces and given durations.
 
@@ -332,10 +361,10 @@ class GaitSolver:
     ) -> tuple[CollocationProgram, NlpResult, Reintegration]:
         """Refine the mesh until an independent integrator agrees and the cost stays."""
         mesh, solver = self.config.mesh, self.config.solver
-        errors = self._errors(program, result, choices.MESHING_TOLERANCE)
         for attempt in range(1, mesh.refinements + 1):
             if not result.converged or self._interrupted:
                 break
+            errors = self._errors(program, result, choices.MESHING_TOLERANCE)
             costly = self._costly(program, result)
             settled = not any(part.any() for part in costly)
             if settled and _within(errors, mesh) and tolerance <= solver.tolerance:
@@ -346,7 +375,6 @@ class GaitSolver:
             name, before = f"refined {attempt}", (program, result)
             program, result = self._refined(name, start, before, tolerance)
             tolerance = solver.tolerance
-            errors = self._errors(program, result, choices.MESHING_TOLERANCE)
         return program, result, self._errors(program, result)
 
     def _refined(self, name: str, start: PhasedMotion, before: Stage, tolerance: float) -> Stage:

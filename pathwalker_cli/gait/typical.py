@@ -19,6 +19,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, ROOT
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.motion_file import read_arrays, read_motion
+from pathwalker_cli.model.contact import contact_pattern
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.paths import shipped
@@ -87,11 +88,12 @@ class TypicalWalk:
 def typical_walks(walker: Walker) -> list[TypicalWalk]:
     """Return the walks in a walker's condition with its phases, of the most similar child first.
 
-    There are none for rarer patterns of contact.
+    Soles that give way begin with the walks of soles that roll.  There are none for rarer patterns.
     """
+    phases = (contact_pattern("sole") if walker.parts.compliant else walker.pattern).names
     paths = sorted((shipped("configs") / "walks").glob(f"*-{walker.condition}.npz"))
     walks = (TypicalWalk.read(path) for path in paths)
-    fitting = [walk for walk in walks if walk.phases == walker.pattern.names]
+    fitting = [walk for walk in walks if walk.phases == phases]
     return sorted(fitting, key=lambda walk: walk.distance(walker))
 
 

@@ -31,6 +31,20 @@ ROUNDNESS: Final = 1.5
 """Radius of a sole where it lies flat, beside its length: under a child that crouches the centre of
 pressure moves 2 to 4 cm while the bare foot turns by .17 rad (see docs/theory.md)."""
 
+SOLE_DEPTH: Final = 0.117
+"""How deep one foot sinks under body weight, as a share of its length: 24.5 mm of an adult of 75 kg
+whose heel and toe, 0.21 m apart, have a stiffness of 5e7 N/m^3 each."""
+SOLE_DAMPING: Final = 0.85
+"""Share by which each m/s of sinking raises its force [s/m]."""
+SOLE_CREEP: Final = 0.01
+"""Sliding speed at which friction is 46 % of dry friction [m/s]."""
+SOLE_EDGE: Final = 1e-4
+"""Height over which the depth under ground is rounded off [m]: a sole that just touches it
+bears some 1e-5 N."""
+
+FRICTION: Final = 0.8
+"""Coefficient of friction, as published; Chang and Matz (2001)."""
+
 # Passive tissue.
 STEEPEST: Final = 5.0
 """Exponent beyond which an exponential goes on as a parabola: 148 N m of an adult, which no joint

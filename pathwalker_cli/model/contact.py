@@ -10,18 +10,30 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import product
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
 from pathwalker_cli.errors import InputError
-from pathwalker_cli.model.choices import ROCKER_SHARES, ROUNDNESS
+from pathwalker_cli.model.choices import (
+    ROCKER_SHARES,
+    ROUNDNESS,
+    SOLE_CREEP,
+    SOLE_DAMPING,
+    SOLE_DEPTH,
+)
 from pathwalker_cli.model.numbers import Number
 from pathwalker_cli.model.skeleton import SIDES, SUFFIX, Side
 
-Feet = Literal["points", "rockers", "sole"]
+if TYPE_CHECKING:
+    from pathwalker_cli.patient import Patient
+
+Feet = Literal["points", "rockers", "sole", "compliant"]
 """What feet touch the ground with: heel and toe as points, the same as circles that roll without
-slipping, or one convex sole that rolls from heel to toe."""
+slipping, one convex sole that rolls from heel to toe, or the same sole giving way."""
+
+SOLES: Final[tuple[Feet, ...]] = ("sole", "compliant")
+"""Feet of one convex body."""
 
 Use = Literal["heel_toe", "flat", "toe"]
 """How a foot with heel and toe is used: lands on the heel and then the toe, lands flat, or walks on
@@ -67,6 +79,25 @@ class ContactPoint:
             "share of the length of the foot, see model.choices",
         )  # fmt: skip
 
+    @cached_property
+    def law(self) -> tuple[Number, Number, Number]:
+        """Numbers of a sole that gives way: depth under body weight, damping, sliding speed."""
+
+        def depth(patient: Patient) -> float:
+            return SOLE_DEPTH * patient.length("foot", self.side)
+
+        source = "Ackermann and van den Bogert (2010), scaled, see model.choices"
+        entries: tuple[tuple[str, str, str, Any], ...] = (
+            ("sole_depth", "depth to which a sole sinks", "m", depth),
+            ("sole_damping", "damping of the sole", "s/m", SOLE_DAMPING),
+            ("sole_creep", "sliding speed of the sole", "m/s", SOLE_CREEP),
+        )
+        first, second, third = (
+            Number(f"{name}.{self.side}", name, label, unit, self.side, default, source)
+            for name, label, unit, default in entries
+        )
+        return first, second, third
+
 
 @dataclass(frozen=True)
 class ContactForce:
@@ -98,11 +129,13 @@ class ContactPhase:
     Args:
         forces: Active components; each stands for one direction in which its place does not move.
         step: The side that stands while the other one swings and lands.
+        compliant: Whether forces follow from how places sink and slide, on the ground or off it.
     """
 
     name: str
     forces: tuple[ContactForce, ...]
     step: Side
+    compliant: bool = False
 
     @cached_property
     def force_names(self) -> tuple[str, ...]:
@@ -182,7 +215,8 @@ class ContactPattern:
 
     def in_the_air(self, phase: ContactPhase) -> list[int]:
         """Return the positions in `points` of the places that are not on the ground."""
-        return [i for i, point in enumerate(self.points) if point not in phase.points]
+        aloft = () if phase.compliant else phase.points
+        return [i for i, point in enumerate(self.points) if point not in aloft]
 
     def strike(self, side: Side) -> int:
         """Return the number of the phase that begins with the foot strike of a side."""
@@ -200,10 +234,14 @@ class ContactPattern:
     def durations(self, parts: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return the durations of the phases from those of `PHASES` [s].
 
-        A single or double support that has one phase takes the time of the two that it has there.
+        A single or double support that has one phase takes the time of the two that it has there,
+        a step that has one phase all of it.
         """
         result: list[float] = []
         for step, quarters in zip(self.steps, np.split(np.asarray(parts, float), 2), strict=True):
+            if len(step) == 1:
+                result.append(float(quarters.sum()))
+                continue
             for support, pair in zip((1, 2), np.split(quarters, 2), strict=True):
                 count = sum(len(phase.feet) == support for phase in step)
                 result += pair.tolist() if count == len(pair) else [float(pair.sum())]
@@ -258,6 +296,10 @@ def contact_pattern(feet: Feet = "points", contact: Contact = HEEL_TOE) -> Conta
     if feet == "sole":
         phases = [p for side in SIDES for p in _step(side, ("sole",), ("sole",))]
         return ContactPattern(_SOLES, tuple(phases))
+    if feet == "compliant":
+        forces = tuple(force for side in SIDES for force in _on(side, "sole"))
+        steps = (ContactPhase(f"{side}_step", forces, side, compliant=True) for side in SIDES)
+        return ContactPattern(_SOLES, tuple(steps))
     use = dict(zip(SIDES, contact, strict=True))
     right = _step("right", _SINGLE[use["right"]], _LANDING[use["left"]])
     left = _step("left", _SINGLE[use["left"]], _LANDING[use["right"]])
@@ -269,7 +311,7 @@ PHASES: Final = contact_pattern().phases
 
 PATTERNS: Final = (
     *(contact_pattern("points", use) for use in product(_SINGLE, repeat=2)),
-    contact_pattern("sole"),
+    *(contact_pattern(feet) for feet in SOLES),
 )
 """All patterns that there are."""
 

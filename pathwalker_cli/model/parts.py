@@ -11,6 +11,7 @@ from pathwalker_cli.conventions import Condition
 from pathwalker_cli.model.contact import (
     HEEL_TOE,
     POINTS,
+    SOLES,
     Contact,
     ContactPattern,
     Feet,
@@ -50,6 +51,16 @@ class Parts:
         return contact_pattern(self.feet, self.contact)
 
     @property
+    def soles(self) -> bool:
+        """Whether each foot is one convex body."""
+        return self.feet in SOLES
+
+    @property
+    def compliant(self) -> bool:
+        """Whether the feet give way, so that the ground reaction follows from the motion."""
+        return self.feet == "compliant"
+
+    @property
     def device(self) -> Device:
         """What the patient walks with."""
         return DEVICES[self.condition]
@@ -78,7 +89,7 @@ class Parts:
         """Radii of the circles in the order of `POINTS`, roundness of the soles; none of points."""
         if self.feet == "points":
             return ()
-        round_soles = self.pattern.points if self.feet == "sole" else ()
+        round_soles = self.pattern.points if self.soles else ()
         return tuple(point.shape for point in (*POINTS, *round_soles))
 
     @cached_property
@@ -88,8 +99,10 @@ class Parts:
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
-        """Every named number: of the elements, then of the bodies."""
-        return (*(n for element in self.elements for n in element.numbers), *self.body_numbers)
+        """Every named number: of the elements, of the bodies, of what gives way."""
+        of_elements = (n for element in self.elements for n in element.numbers)
+        yielding = self.pattern.points if self.compliant else ()
+        return (*of_elements, *self.body_numbers, *(n for place in yielding for n in place.law))
 
     def unknowns(self, free: Sequence[str] = ()) -> tuple[Unknown, ...]:
         """Return what a problem chooses: what is asked for, and what a device is identified by.

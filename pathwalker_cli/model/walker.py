@@ -15,6 +15,8 @@ from pathwalker_cli.conventions import CONDITIONS, SIDES, Condition
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.backends import rigid_body_functions
 from pathwalker_cli.model.backends.functions import RigidBodyFunctions
+from pathwalker_cli.model.choices import FRICTION
+from pathwalker_cli.model.compliance import ground_force
 from pathwalker_cli.model.contact import (
     HEEL_TOE,
     POINTS,
@@ -47,6 +49,7 @@ class Walker:
         values: Every named number by address [SI].
         unknowns: The numbers that a problem is free to choose.
         published: Whether it reproduces the quirks of the published model.
+        friction: Coefficient of friction of soles that give way.
     """
 
     patient: Patient
@@ -57,6 +60,7 @@ class Walker:
     values: Mapping[str, float]
     unknowns: tuple[Unknown, ...] = ()
     published: bool = False
+    friction: float = FRICTION
 
     def __repr__(self) -> str:
         """Return who walks, and with what."""
@@ -268,7 +272,8 @@ class Walker:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return accelerations and ground reaction forces while some points cannot move.
 
-        Solves M vdot + h = tau + J' f, J vdot + dJ/dt v = 0 for the directions of the phase.
+        Solves M vdot + h = tau + J' f, J vdot + dJ/dt v = 0 for the directions of the phase; of
+        soles that give way, f is their law; see `model.compliance`.
 
         Args:
             phase: A contact phase, its name or its number.
@@ -304,18 +309,39 @@ class Walker:
         contact = phase if isinstance(phase, ContactPhase) else phase_named(phase)
         active = self.pattern.indices(contact)
         count, n, size = len(q), self.skeleton.size, len(active)
-        mass, bias, jacobian, drift = map(np.asarray, (terms or self.dynamics_terms)(q.T, v.T))
+        mass, bias, jacobian, drift, places = map(
+            np.asarray, (terms or self.dynamics_terms)(q.T, v.T)
+        )
         # of m instants CasADi sets the matrices side by side
         jacobian = jacobian.reshape(-1, count, n)[active].swapaxes(0, 1)
         matrix = np.zeros((count, n + size, n + size))
         matrix[:, :n, :n] = mass.reshape(n, count, n).swapaxes(0, 1)
         matrix[:, n:, :n] = jacobian
         matrix[:, :n, n:] = -jacobian.swapaxes(1, 2)
+        if contact.compliant:
+            velocity = np.einsum("ijk,ik->ij", jacobian, v)
+            forces = self._ground_forces(places.T, velocity)
+            pushed = tau - bias.T + np.einsum("ij,ijk->ik", forces[:, active], jacobian)
+            return np.linalg.solve(matrix[:, :n, :n], pushed[..., None])[..., 0], forces
         right = np.hstack([tau - bias.T, -drift[active].T])[..., None]
         solution = np.linalg.solve(matrix, right)[..., 0]
         forces = np.zeros((count, len(self.pattern.forces)))
         forces[:, active] = solution[:, n:]
         return solution[:, :n], forces
+
+    def _ground_forces(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return the forces on soles that give way [N] at m instants, (m, 4).
+
+        Of places and velocities of the contacts, (m, 4) each [m, m/s].
+        """
+        known = self.values, self.weight, self.friction
+        forces = [
+            ground_force(
+                place, position[:, 2 * i + 1], (velocity[:, 2 * i], velocity[:, 2 * i + 1]), *known
+            )
+            for i, place in enumerate(self.pattern.points)
+        ]
+        return np.concatenate(forces).T
 
     def contact_points(self, q: Any) -> np.ndarray:
         """Return where the places of `pattern.points` touch the ground in q (10,), or would.
@@ -344,12 +370,13 @@ class Walker:
 
     @cached_property
     def dynamics_terms(self) -> ca.Function:
-        """Function (q, v) -> mass matrix, bias, point Jacobian, point acceleration at vdot = 0."""
+        """Function (q, v) -> mass, bias; of contacts Jacobian, acceleration at vdot = 0, place."""
         body, theta = self.rigid_body, self.rigid_body.parameters
         q, v = ca.SX.sym("q", body.nq), ca.SX.sym("v", body.nq)
         still = body.point_accelerations(q, v, ca.SX.zeros(body.nq), theta)
+        places = body.point_positions(q, theta)
         terms = body.mass_matrix(q, theta), body.bias(q, v, theta), body.point_jacobian(q, theta)
-        return ca.Function("dynamics", [q, v], [ca.densify(x) for x in (*terms, still)])
+        return ca.Function("dynamics", [q, v], [ca.densify(x) for x in (*terms, still, places)])
 
 
 def _vector(values: Any, size: int, name: str) -> np.ndarray:
@@ -393,6 +420,7 @@ def walker_of(
     published: bool = False,
     backend: str = "auto",
     free: Sequence[str] = (),
+    friction: float = FRICTION,
 ) -> Walker:
     """Return the walking model of a patient.
 
@@ -402,6 +430,7 @@ def walker_of(
         published: Reproduce the quirks of the published model (right forearm).
         backend: Dynamics back end, see `model.backends`.
         free: Addresses of numbers that a problem may choose, beside those that it looks for anyway.
+        friction: Coefficient of friction of soles that give way.
 
     Raises:
         PatientError: If the patient lacks strengths or, for "orthosis", an orthosis.
@@ -412,14 +441,14 @@ def walker_of(
     model = pinocchio_model(patient, parts.condition, published)
     values = {n.address: n.value_for(patient) for n in parts.numbers}
     frames, shapes = [point.name for point in POINTS], [values[n.address] for n in parts.shapes]
-    soles = parts.feet == "sole"
     return Walker(
         patient=patient,
         parts=parts,
         skeleton=PLANAR_WALKER,
         model=model,
-        rigid_body=rigid_body_functions(model, frames, backend, shapes, soles),
+        rigid_body=rigid_body_functions(model, frames, backend, shapes, parts.soles),
         values=values,
         unknowns=parts.unknowns(free),
         published=published,
+        friction=friction,
     )

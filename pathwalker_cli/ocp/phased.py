@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -132,6 +133,27 @@ class PhaseMotion:
             inner_states=self.states_at(points).reshape(shape),
             algebraic=self.algebraic_at(points).reshape(shape),
         )
+
+
+def joined(name: str, parts: Sequence[PhaseMotion]) -> PhaseMotion:
+    """Return phases that follow each other as one phase."""
+    ends = np.cumsum([part.duration for part in parts])
+    pieces = [
+        (e + p.duration * (p.mesh[1:] - 1.0)) / ends[-1] for e, p in zip(ends, parts, strict=True)
+    ]
+
+    def at_nodes(key: str) -> np.ndarray:
+        first, *others = (getattr(part, key) for part in parts)
+        return np.concatenate([first, *(values[1:] for values in others)])
+
+    return PhaseMotion(
+        name=name,
+        duration=float(ends[-1]),
+        mesh=np.concatenate([[0.0], *pieces]),
+        **{key: at_nodes(key) for key in ("states", "smooth", "controls", "integrals")},
+        inner_states=np.concatenate([part.inner_states for part in parts]),
+        algebraic=np.concatenate([part.algebraic for part in parts]),
+    )
 
 
 @dataclass(frozen=True)

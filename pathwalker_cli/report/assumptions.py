@@ -25,7 +25,7 @@ _METHODS: Final = {
 }
 _FEET: Final[dict[Feet, str]] = {
     "points": "a heel and a toe point", "rockers": "circles at heel and toe that roll",
-    "sole": "one convex sole that rolls",
+    "sole": "one convex sole that rolls", "compliant": "one convex sole that gives way",
 }  # fmt: skip
 _JOINT: Final = re.compile(rf"\b({'|'.join(LEG_JOINTS)})_([rl])\b")
 _TWO_FEET: Final = re.compile(r"\b(right|left)_(toe|flat)_(right|left)_(heel|flat)\b")

@@ -116,10 +116,11 @@ def summary_rows(
 
 
 def _landing(metrics: Mapping[str, Any], side: str) -> str:
-    """Return what of a foot lands first, and where between heel and toe."""
-    index = metrics[f"strike_index_{side}"]
+    """Return what of a foot lands first, where between heel and toe, and whether it stays there."""
+    index, rearmost = metrics[f"strike_index_{side}"], metrics[f"rearmost_pressure_{side}"]
     part = "rearfoot" if index < 1 / 3 else "midfoot" if index < 2 / 3 else "forefoot"
-    return f"{side} {part} ({100 * index:.0f} % of heel to toe)"
+    stays = ", walks on the toes" if (rearmost or 0.0) > 2 / 3 else ""
+    return f"{side} {part} ({100 * index:.0f} % of heel to toe){stays}"
 
 
 def _cuff(metrics: Mapping[str, Any], side: str) -> str:
@@ -222,7 +223,9 @@ def _discretisation_text(solution: GaitSolution) -> str:
 def _balance_text(found: Mapping[str, float]) -> str:
     energy = f"{found['energy']:.1e} J of {found['work_scale']:.3g} J"
     momentum = f"{found['impulse']:.1e} N s of {found['impulse_scale']:.3g} N s"
-    return f"work and energy within {energy}, forces and momentum within {momentum}"
+    text = f"work and energy within {energy}, forces and momentum within {momentum}"
+    lost = found["ground_loss"]
+    return f"{text}; the ground takes up {lost:.2g} J" if lost > 0.0 else text
 
 
 def _words(name: str) -> str:

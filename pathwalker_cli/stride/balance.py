@@ -24,6 +24,7 @@ class Balance:
         muscle_work: Net work of all muscles [J].
         orthosis_work: Net work of both orthoses [J]; 0 but for the ends of an aperiodic stride.
         contact_work: Work of the ground on the body, all amounts added up [J]; 0 without slip.
+        ground_loss: Net work of the body on the ground [J]: what soles that give way take up.
         energy_change: Mechanical energy at the end less that at the beginning [J].
         energy: Largest difference of work done and energy gained since the beginning [J].
         work_scale: Work that muscles did and took up, all amounts added up [J].
@@ -37,6 +38,7 @@ class Balance:
     muscle_work: float
     orthosis_work: float
     contact_work: float
+    ground_loss: float
     energy_change: float
     energy: float
     work_scale: float
@@ -68,6 +70,7 @@ def balance(series: GaitSeries) -> Balance:
         muscle_work=float(weights @ muscles.sum(axis=1)),
         orthosis_work=float(weights @ orthosis),
         contact_work=float(weights @ np.abs(contact)),
+        ground_loss=-float(weights @ contact),
         energy_change=float(gained[-1]),
         energy=float(np.abs(work - gained)[rows].max()),
         work_scale=float(weights @ np.abs(muscles).sum(axis=1)),

@@ -40,7 +40,7 @@ def touched(walker: Walker, data: pin.Data) -> list[Touched]:
         place + radius * (np.array(data.oMf[frame].rotation)[:, 2] - upright)
         for frame, place, radius in zip(frames, at, radii, strict=True)
     ]
-    if walker.parts.feet != "sole":
+    if not walker.parts.soles:
         rows = zip(frames, at, low, strict=True)
         return [Touched(frame, lowest - place, lowest) for frame, place, lowest in rows]
     found = []

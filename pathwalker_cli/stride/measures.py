@@ -43,7 +43,6 @@ from pathwalker_cli.stride.stride import (
     LOADED_SHARE,
     NotKnownError,
     Stride,
-    contacts,
     toe_bearing,
 )
 
@@ -85,8 +84,8 @@ def _peak_vertical_force(stride: Stride, side: Side) -> float:
 
 def _least_point_force(stride: Stride) -> float:
     """Return the least vertical force on a contact point in contact [N]."""
-    touching = contacts(stride.walker, tuple(stride.known("phase")))
-    return float(stride.known("point_force")[:, 1::2][touching].min())
+    up = stride.known("point_force")[:, 1::2]
+    return float((up if stride.walker.parts.compliant else up[stride.contacts]).min())
 
 
 def _friction_ratio(stride: Stride, side: Side) -> float:
@@ -121,7 +120,7 @@ def ankle_torque_line(stride: Stride, side: Side) -> tuple[float, float]:
     instant counts by its share of time.  Positive like a spring that resists dorsiflexion; NaN if
     the ankle does not move.
     """
-    rows = toe_bearing(stride.walker, tuple(stride.known("phase")), side)
+    rows = toe_bearing(stride, side)
     name = f"ankle_{SUFFIX[side]}"
     angle, weight = -stride.column(name)[rows], stride.weights[rows]
     torque = stride.known("net_torque")[rows, COORDINATES.index(name)]
@@ -162,6 +161,22 @@ def _strike_index(stride: Stride, side: Side) -> float:
     places = stride.walker.contact_points(pose)[pattern.rows(side)]
     landed = places[np.argmin(places[:, 1])]
     return float((landed - heel) @ (toe - heel) / ((toe - heel) @ (toe - heel)))
+
+
+def _rearmost_pressure(stride: Stride, side: Side) -> float:
+    """Return how near to the heel (0) from the toe (1) the centre of pressure of a side gets.
+
+    NaN if the foot is never loaded.
+    """
+    walker, first = stride.walker, 2 * SIDES.index(side)
+    at = np.flatnonzero(stride.foot_force(side)[:, 1] > LOADED_SHARE * walker.weight)
+    if not at.size:
+        return np.nan
+    rows = walker.pattern.rows(side)
+    load = stride.known("point_force")[at, 1::2][:, rows]
+    centre = (load * stride.contact_position[at][:, rows, 0]).sum(axis=1) / load.sum(axis=1)
+    ends = np.array([walker.foot_points(q)[first : first + 2, 0] for q in stride.q[at]])
+    return float(((centre - ends[:, 0]) / np.diff(ends)[:, 0]).min())
 
 
 def _cuff_force(stride: Stride, side: Side, sign: float) -> float:
@@ -248,6 +263,10 @@ REGISTRY: tuple[Measure, ...] = (
     *per_side("strike_index_*", "strike index, *", "1",
               "where from heel to toe a foot lands: rearfoot below 1/3, forefoot above 2/3 "
               "(Cavanagh and Lafortune 1980)", _strike_index, section=WALK, part="stance"),
+    *per_side("rearmost_pressure_*", "rearmost pressure, *", "1",
+              "where from heel to toe the centre of pressure is when it is nearest to the heel: "
+              "above 2/3 a foot walks on its toes", _rearmost_pressure, section=WALK,
+              part="stance", shown=False),
     *per_side("peak_vertical_force_*", "peak vertical force, *", "N",
               "largest vertical ground reaction force", _peak_vertical_force, section=FORCE,
               part="stance", shown=False),

@@ -13,6 +13,7 @@ from scipy.integrate import trapezoid
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
+from pathwalker_cli.io.c3d_plates import LOADED
 from pathwalker_cli.model.contact import ContactPattern, phase_named
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion
@@ -162,9 +163,18 @@ class Stride(Sampled):
         """Return whether anything of a foot is on the ground, shape (n,)."""
         if self.phase:
             rows = self.walker.pattern.rows(side)
-            return np.asarray(contacts(self.walker, self.phase)[:, rows].any(axis=1))
+            return np.asarray(self.contacts[:, rows].any(axis=1))
         strike, toe_off = self.stance(side)
         return np.asarray((strike <= self.time) & (self.time <= toe_off))
+
+    @property
+    def contacts(self) -> np.ndarray:
+        """Whether each place of the walker's pattern is on the ground, shape (n, k).
+
+        Raises:
+            NotKnownError: If phases are not known.
+        """
+        return contacts(self.walker, tuple(self.known("phase")), self.point_force)
 
     @cached_property
     def weights(self) -> np.ndarray:
@@ -254,7 +264,7 @@ def stride_of(
         walker=series.walker,
         time=series.time,
         q=series.q,
-        stances=phase_stances(pattern, durations),
+        stances=stances_of(series),
         problem=problem,
         phase=series.phase,
         v=series.v,
@@ -302,6 +312,32 @@ def phase_stances(
     return found
 
 
+def stances_of(series: GaitSeries) -> dict[Side, tuple[float, float]]:
+    """Return foot strike and toe-off of each side [s]; of what gives way, from its load.
+
+    Toe-off is then the end of the side's own step, and the strike where the load that lasts until
+    toe-off passes `LOADED`.
+    """
+    pattern = series.walker.pattern
+    switching = switching_times(pattern, series.motion)
+    if not series.walker.parts.compliant:
+        return phase_stances(pattern, np.diff(switching))
+    duration, found = series.duration, {}
+    for side, toe_off in zip(SIDES, switching[1:].tolist(), strict=True):
+        since = (series.time - toe_off) % duration
+        order = np.argsort(since, kind="stable")
+        load = series.vertical_force(side)[order]
+        rising = np.flatnonzero((load[:-1] <= LOADED) & (load[1:] > LOADED))
+        strike = toe_off % duration  # a foot that never lifts, as in an iterate that is no solution
+        if rising.size:
+            last = int(rising[-1])
+            share = (LOADED - load[last]) / (load[last + 1] - load[last])
+            begin, end = since[order][last : last + 2]
+            strike = (toe_off + begin + share * (end - begin)) % duration
+        found[side] = strike, toe_off if toe_off > strike else toe_off + duration
+    return found
+
+
 @dataclass(frozen=True)
 class OwnCycle:
     """The gait cycle of one side, from its foot strike to its next one.
@@ -324,8 +360,7 @@ class OwnCycle:
 def own_cycle(series: GaitSeries, side: Side) -> OwnCycle:
     """Return the gait cycle of a side."""
     duration, time = series.duration, series.time
-    pattern = series.walker.pattern
-    strike, toe_off = phase_stances(pattern, np.diff(switching_times(pattern, series.motion)))[side]
+    strike, toe_off = stances_of(series)[side]
     first = int(np.argmin(np.abs(time - strike)))
     index = np.concatenate([np.arange(first, time.size), np.arange(first + 1)])
     later = np.repeat([0.0, duration], [time.size - first, first + 1])
@@ -333,17 +368,27 @@ def own_cycle(series: GaitSeries, side: Side) -> OwnCycle:
     return OwnCycle(side, index, percent, 100.0 * ((toe_off - strike) % duration) / duration)
 
 
-def contacts(walker: Walker, phase: tuple[str, ...]) -> np.ndarray:
-    """Return whether each place of the pattern is on the ground in each of n phases, (n, k)."""
+def contacts(walker: Walker, phase: tuple[str, ...], force: np.ndarray | None) -> np.ndarray:
+    """Return whether each place of the pattern is on the ground at n instants, (n, k).
+
+    The phase of each tells it; what gives way is on the ground where it is loaded.
+
+    Args:
+        walker: Who walks.
+        phase: Name of the phase at each instant.
+        force: Forces in the order of the pattern [N], shape (n, 2 k); needed of what gives way.
+    """
+    if walker.parts.compliant and force is not None:
+        return np.asarray(force[:, 1::2] > LOADED)
     points = {name: phase_named(name).points for name in set(phase)}
     return np.array([[point in points[name] for point in walker.pattern.points] for name in phase])
 
 
-def toe_bearing(walker: Walker, phase: tuple[str, ...], side: Side) -> np.ndarray:
-    """Return whether a foot stands on more than its heel in each of n phases, shape (n,)."""
-    points = walker.pattern.points
-    rows = [i for i in walker.pattern.rows(side) if points[i].place != "heel"]
-    return np.asarray(contacts(walker, phase)[:, rows].any(axis=1))
+def toe_bearing(stride: Stride, side: Side) -> np.ndarray:
+    """Return whether a foot stands on more than its heel, shape (n,)."""
+    pattern = stride.walker.pattern
+    rows = [i for i in pattern.rows(side) if pattern.points[i].place != "heel"]
+    return np.asarray(stride.contacts[:, rows].any(axis=1))
 
 
 def loaded(series: GaitSeries, side: Side) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
 
+from pathwalker_cli.model.compliance import ground_force
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.taped import Columns
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
@@ -101,7 +102,7 @@ def second_engine_residual(series: GaitSeries) -> float:
     """Return the largest violation of the equations of motion in numeric Pinocchio [N, N m].
 
     Independent of the symbolic functions: `pin.rnea`, frame Jacobians, and the NumPy muscle and
-    orthosis curves.
+    orthosis curves.  What gives way must also be pushed by as much as its law says.
     """
     walker = series.walker
     model, data = walker.model, walker.model.createData()
@@ -109,15 +110,26 @@ def second_engine_residual(series: GaitSeries) -> float:
     given = walker.generalised_forces(elements) + series.reserve
     worst = 0.0
     for k in range(len(series.time)):
-        q = np.array(series.q[k])
-        needed = pin.rnea(model, data, q, np.array(series.v[k]), np.array(series.vdot[k]))
+        q, v = np.array(series.q[k]), np.array(series.v[k])
+        needed = pin.rnea(model, data, q, v, np.array(series.vdot[k]))
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
-        for place, force in zip(touched(walker, data), series.force[k].reshape(-1, 2), strict=True):
+        forces = zip(
+            walker.pattern.points,
+            touched(walker, data),
+            series.force[k].reshape(-1, 2),
+            strict=True,
+        )
+        for point, place, force in forces:
             jacobian = pin.getFrameJacobian(model, data, place.frame, pin.LOCAL_WORLD_ALIGNED)
             forward, _, upward = place.arm
             rows = jacobian[[0, 2]] + np.outer((upward, -forward), jacobian[4])
             needed = needed - rows.T @ force
+            if walker.parts.compliant:
+                forward, up = (rows @ v).tolist()
+                known = walker.values, walker.weight, walker.friction
+                law = ground_force(point, place.position[2], (forward, up), *known)
+                worst = max(worst, float(np.abs(force - law).max()))
         worst = max(worst, float(np.abs(needed - given[k]).max()))
     return worst
 

@@ -242,9 +242,12 @@ def _dynamics(run: Run, series: GaitSeries, numbers: dict[str, Any]) -> Iterator
     ):
         yield Check(f"re-integrated {name}", error if refined else None, limit, unit, note)
     balances = balance(series)
+    work, ground = "work of the ground", balances.contact_work
+    if walker.parts.compliant:
+        work, ground = "ground that gives work", max(0.0, -balances.ground_loss)
     shares = (
         ("work against energy", balances.energy / balances.work_scale, _ENERGY),
-        ("work of the ground", balances.contact_work / balances.work_scale, _ENERGY),
+        (work, ground / balances.work_scale, _ENERGY),
         ("impulse against momentum", balances.impulse / balances.impulse_scale, _MOMENTUM),
         ("angular impulse", balances.angular_impulse / balances.angular_scale, _MOMENTUM),
     )

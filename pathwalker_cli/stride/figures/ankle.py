@@ -92,9 +92,10 @@ def _draw_profile(ax: Axes, series: GaitSeries, side: Side) -> None:
     name = f"ankle_{SUFFIX[side]}"
     angle = -series.column(name)
     torque = series.net_torque[:, COORDINATES.index(name)]
-    bearing = toe_bearing(series.walker, series.phase, side)
+    stride = stride_of(series)
+    bearing = toe_bearing(stride, side)
     look = style.side_line(side)
-    slope, offset = ankle_torque_line(stride_of(series), side)
+    slope, offset = ankle_torque_line(stride, side)
     style.zero_line(ax)
     ax.plot(to_degrees(angle), torque, linewidth=0.6, **look)
     thick = np.where(bearing, torque, np.nan)

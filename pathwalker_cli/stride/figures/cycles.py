@@ -23,7 +23,7 @@ from pathwalker_cli.stride.figures.curves import (
     Reference,
 )
 from pathwalker_cli.stride.series import GaitSeries
-from pathwalker_cli.stride.stride import Stride, contacts, own_cycle, stride_of
+from pathwalker_cli.stride.stride import Stride, own_cycle, stride_of
 
 _ANGLES: Final = {"pelvis_tilt_*": "Pelvis", "hip_*": "Hip", "knee_*": "Knee", "ankle_*": "Ankle",
                   "lumbar_*": "Trunk against pelvis"}  # fmt: skip
@@ -83,10 +83,10 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
 
 def support_changes(stride: Stride, side: Side) -> np.ndarray:
     """Return where a heel or toe of a foot meets or leaves the ground in its own cycle [%]."""
-    walker, ends = stride.walker, np.cumsum([*stride.phase_durations.values()])
-    foot = contacts(walker, (*stride.phase_durations,))[:, walker.pattern.rows(side)]
+    strike, rows = stride.strike(side), stride.walker.pattern.rows(side)
+    foot = stride.contacts[:, rows]
     changed = (foot != np.roll(foot, -1, axis=0)).any(axis=1)
-    later = (ends[changed] - stride.strike(side)) % stride.duration
+    later = (stride.time[changed] - strike) % stride.duration
     return np.sort(100.0 * later / stride.duration)
 
 
