@@ -5,6 +5,7 @@ Axes and signs stand in `model.skeleton`, from which the generalised coordinates
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Final, Literal
 
 import numpy as np
@@ -58,6 +59,13 @@ CONTACT_FORCES: Final = contact_pattern().force_names
 
 CONDITIONS: Final = ("barefoot", "orthosis")
 Condition = Literal["barefoot", "orthosis"]
+
+
+def worn_words(braced: Collection[Side]) -> str:
+    """Return in words what is worn if these sides wear an orthosis."""
+    if not braced:
+        return "barefoot"
+    return "with orthoses" if len(braced) == len(SIDES) else f"with an orthosis {min(braced)}"
 
 
 def coordinate_index(name: str) -> int:

@@ -226,8 +226,8 @@ def test_an_orthosis_is_told_in_degrees_with_directions(child: Path, file: str) 
     text = " ".join(run(child / file).output.split())
     for part in (
         "neutral angle 1.1 deg dorsiflexion, play 0.6 deg around it, preload 1 N m either way",
-        "stops right and left: 7.4 deg dorsiflexion to 5.7 deg plantarflexion",
-        "springs K_D 5 to 92, K_P 5 to 92 N m/rad",
+        "stops right and left: 7.4 deg dorsiflexion to 5.7 deg plantarflexion, as stiff as 200 and",
+        "springs right and left: K_D 5 to 92, K_P 5 to 92 N m/rad",
         "real springs K_D flexible 40.1, stiff 91.7; K_P softest 5, flexible 40.1 N m/rad",
     ):
         assert part in text, part
@@ -247,7 +247,7 @@ def test_barefoot_nothing_is_told_of_orthoses(child: Path) -> None:
     assert "neutral angle" not in run(child / "mapd-barefoot.yaml").output
     assert check_file(str(child / "mapd-barefoot.yaml")).content["orthosis"] is None
     content = check_file(str(child / "mapd-orthosis.yaml")).content
-    assert content["orthosis"]["neutral_angle"] == -0.02
+    assert content["orthosis"]["neutral_angle"] == {"right": -0.02, "left": -0.02}
 
 
 @pytest.mark.parametrize(

@@ -317,10 +317,11 @@ def test_shapes_are_numbers_like_all_others() -> None:
     walker: Walker = build_walker(PATIENT, feet="sole", free=free)
     assert [u.name for u in walker.unknowns] == ["sole_roundness", "toe_radius_left"]
     moved = walker.with_parameters([2.0, 0.04])
-    slopes = [walker.body_slopes(u) for u in walker.unknowns]
-    changes = np.array([2.0 - walker.values["sole_roundness.left"], 0.04 - walker.shapes[3]])
+    numbers = [number for unknown in walker.unknowns for number in unknown.numbers]
+    slopes = [walker.body_slopes(number) for number in numbers]
+    changes = [moved.values[n.address] - walker.values[n.address] for n in numbers]
     assert moved.rigid_body.parameters == pytest.approx(
-        walker.rigid_body.parameters + changes @ np.array(slopes)
+        walker.rigid_body.parameters + np.array(changes) @ np.array(slopes)
     )
     assert ca.DM(moved.rigid_body.parameters).is_regular()
     given = PATIENT.model_copy(update={"numbers": {"rocker_radius.heel": 0.05}})

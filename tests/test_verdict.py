@@ -129,10 +129,9 @@ def test_stops_that_are_reached_are_named() -> None:
 def test_stops_are_measured_on_the_stride() -> None:
     series = stylised_series()
     fixed = series.walker.orthosis
-    assert fixed is not None
     found = {(stop.side, stop.stop): stop for stop in _stops(series)}
     ankle = series.column("ankle_r")
-    expected = fixed[0].dorsiflexion_stop - ankle.min()
+    expected = fixed["right"].dorsiflexion_stop - ankle.min()
     assert found["right", "dorsiflexion"].excess == pytest.approx(expected)
     assert (found["right", "dorsiflexion"].share > 0.0) == (expected > 0.0)
 
@@ -197,7 +196,7 @@ def test_the_shipped_springs_lie_in_their_range() -> None:
     worn = load_patient("sreenivasa2017-patient").require_orthosis()
     assert worn.springs is not None
     for kind in ("dorsiflexion", "plantarflexion"):
-        low, high = getattr(worn.stiffness_range, kind)
+        low, high = getattr(worn.stiffness_range, kind)["right"]
         assert all(low <= spring.stiffness <= high for spring in getattr(worn.springs, kind))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import COORDINATES, GRAVITY, SIDES
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.gait.bounds import Range
+from pathwalker_cli.gait.bounds import Range, real_springs
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.patient import OrthosisData, Patient
 from pathwalker_cli.patient.proportions import SOURCE, default_length
@@ -64,7 +64,8 @@ def odd_orthosis(orthosis: OrthosisData, prefix: str = "") -> Iterator[str]:
     if orthosis.springs is None:
         return
     for kind in ("dorsiflexion", "plantarflexion"):
-        low, high = getattr(orthosis.stiffness_range, kind)
+        pairs = getattr(orthosis.stiffness_range, kind).given.values()
+        low, high = min(pair[0] for pair in pairs), max(pair[1] for pair in pairs)
         for spring in getattr(orthosis.springs, kind):
             if not low <= spring.stiffness <= high:
                 yield (
@@ -185,9 +186,8 @@ def _spring_ranges(solver: GaitSolver) -> Iterator[tuple[str, Range, Range]]:
     for unknown in solver.walker.unknowns:
         kind = unknown.numbers[0].name
         if kind in solver.walker.device.identified:
-            real = solver.walker.patient.require_orthosis().stiffness_range
             pair = solver.bounds.ranges[unknown.name]
-            yield unknown.name, pair, getattr(real, kind.removesuffix("_stiffness"))
+            yield unknown.name, pair, real_springs(solver.walker.patient, unknown)
 
 
 def _springs(solver: GaitSolver) -> Iterator[ConfigError]:

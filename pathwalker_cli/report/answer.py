@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from pathwalker_cli.config.values import differing_values
-from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.conventions import STIFFNESSES, worn_words
 from pathwalker_cli.report.assumptions import in_words
 from pathwalker_cli.report.changes import Outcome, base_of, short, sides_of, together
 from pathwalker_cli.report.content import Section
@@ -95,19 +95,19 @@ def _pair(sides: Sequence[Outcome], which: int) -> str:
 
 def _wearing(run: ReportRun) -> str:
     """Return what is worn, with the name of the run where it is more than its condition."""
-    worn = "With orthoses" if run.worn else "Barefoot"
+    worn = worn_words(run.braced).capitalize()
     return worn if run.label == run.run.config.condition else f"{worn} ({run.label})"
 
 
 def _springs(run: ReportRun, several: bool) -> str:
     """Return which springs to fit."""
     named = f" of {run.label}" if several else ""
-    if all(prescribed(run, name) for name in STIFFNESSES):
-        return f"The springs{named} were given, not searched for: {_values(run, STIFFNESSES)}."
+    if all(prescribed(run, name) for name in run.springs):
+        return f"The springs{named} were given, not searched for: {_values(run, run.springs)}."
     if run.verdict is None:
-        found = _values(run, STIFFNESSES)
+        found = _values(run, run.springs)
         return f"How sure the springs{named} are was not examined; least effort took {found}."
-    free = [name for name in STIFFNESSES if not prescribed(run, name)]
+    free = [name for name in run.springs if not prescribed(run, name)]
     undecided = [name for name in free if left_open(run, name)]
     if len(undecided) == len(free):
         return (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pathwalker_cli.conventions import worn_words
 from pathwalker_cli.report.answer import answer, hinge_section
 from pathwalker_cli.report.assumptions import assumption_section
 from pathwalker_cli.report.changes import JUDGED, change_section, outcomes
@@ -34,15 +35,21 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
         Fact("Height", f"{patient.height:g} m"),
         *_of_runs(runs),
     )
-    named = ", ".join({"orthosis": "with orthoses"}.get(run.label, run.label) for run in runs)
+    named = ", ".join(
+        worn_words(run.braced) if run.label == "orthosis" else run.label for run in runs
+    )
     title = f"Gait of {patient.id}: {named}"
     return Page(title, facts, answer(runs, found), tuple(_warnings(runs)), tuple(sections))
 
 
 def _mass(runs: Sequence[ReportRun]) -> str:
-    """Return the body mass, and what it is with orthoses."""
-    worn = dict.fromkeys(f"{r.evaluation.gait.walker.total_mass:.1f} kg" for r in runs if r.worn)
-    more = f" ({', '.join(worn)} with orthoses)" if worn else ""
+    """Return the body mass, and what it is with what is worn."""
+    worn = dict.fromkeys(
+        f"{run.evaluation.gait.walker.total_mass:.1f} kg {worn_words(run.braced)}"
+        for run in runs
+        if run.worn
+    )
+    more = f" ({', '.join(worn)})" if worn else ""
     return f"{runs[0].patient.body_mass:g} kg{more}"
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+import numpy as np
+
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.model.numbers import Unknown
@@ -51,10 +53,10 @@ def measures_with(units: Mapping[str, str]) -> tuple[Measure, ...]:
 def ranges_of(optimum: Optimum) -> dict[str, tuple[float, float]]:
     """Return the allowed range of every spring and unknown; none where it follows another one."""
     ranges = dict(optimum.solver.bounds.ranges)
-    springs = STIFFNESSES if optimum.config.condition == "orthosis" else ()
+    known = zip(STIFFNESSES, optimum.stiffness.tolist(), strict=False)  # none barefoot
+    springs = {name: value for name, value in known if np.isfinite(value)}
     if not all(name in ranges for name in springs):
-        values = zip(springs, optimum.stiffness.tolist(), strict=True)
-        ranges = {name: (value, value) for name, value in values} | ranges
+        ranges = {name: (value, value) for name, value in springs.items()} | ranges
     return {name: ranges[name] for name in dict.fromkeys((*springs, *ranges))}
 
 

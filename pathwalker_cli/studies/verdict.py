@@ -131,7 +131,7 @@ class Verdict:
     """All that is known about an identification.
 
     Args:
-        springs: Every spring, in the order of `conventions.STIFFNESSES`.
+        springs: Every spring that is worn, in the order of `conventions.STIFFNESSES`.
         numbers: Every other number that was free to choose.
         stops: Every hard stop.
         snapped: The choice among real springs; None where the file lists none.
@@ -338,7 +338,7 @@ def _optima(verdict: Verdict) -> str:
         if spring.prescribed:
             continue
         row = STIFFNESSES.index(spring.name)
-        values = [optimum.stiffness[row] for optimum in verdict.optima]
+        values = [k for optimum in verdict.optima if (k := optimum.stiffness[row]) is not None]
         spread.append(f"{measure_of(spring.name).label} {min(values):.0f} to {max(values):.0f}")
     return f"{text}, with {', '.join(spread)} N m/rad"
 

@@ -11,17 +11,16 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.gait.bounds import held
 from pathwalker_cli.gait.neighbourhood import Derivative, Neighbourhood
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.gait.symmetry import require_symmetry
-from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.io.fields import Quantity, Sides
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient.blocks import SegmentLengths, Strengths
+from pathwalker_cli.patient.blocks import SegmentLengths, Springs, Strengths
 from pathwalker_cli.patient.variation import Variation, varied
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import (
@@ -49,11 +48,7 @@ POINTS: Final = "points"
 
 _ORTHOSIS: Final = ("neutral_angle", "free_play", "preload_torque")
 
-_ORTHOSIS_PAIRS: Final = {
-    "dorsiflexion_stop": SIDES,
-    "plantarflexion_stop": SIDES,
-    "stop_stiffness": ("dorsiflexion", "plantarflexion"),
-}
+_STOPS: Final = ("dorsiflexion_stop", "plantarflexion_stop")
 
 Step = Annotated[float, Quantity("", 1e-5, 0.2, above="is it in percent?")]
 
@@ -76,7 +71,8 @@ def default_places(patient: Patient, with_orthosis: bool) -> tuple[str, ...]:
     places = []
     if with_orthosis:
         places += [f"orthosis.{name}" for name in _ORTHOSIS]
-        places += [f"orthosis.{name}.{end}" for name, two in _ORTHOSIS_PAIRS.items() for end in two]
+        places += [f"orthosis.{n}.{s}" for n in _STOPS for s in patient.braced("orthosis")]
+        places += [f"orthosis.stop_stiffness.{name}" for name in Springs.model_fields]
     places += ["strengths"]
     for name in Strengths.model_fields:
         sides = ("",) if name.startswith("lumbar") else (".right", ".left")
@@ -190,6 +186,8 @@ def _value(optimum: Optimum, place: str) -> float | None:
     value: Any = optimum.solver.walker.patient
     for part in place.split("."):
         value = getattr(value, part, None)
+    if isinstance(value, Sides) and len(alike := set(value.given.values())) == 1:
+        (value,) = alike
     return float(value) if isinstance(value, int | float) else None
 
 
