@@ -65,7 +65,8 @@ def worn_words(braced: Collection[Side]) -> str:
     """Return in words what is worn if these sides wear an orthosis."""
     if not braced:
         return "barefoot"
-    return "with orthoses" if len(braced) == len(SIDES) else f"with an orthosis {min(braced)}"
+    one = f"with an orthosis on the {min(braced)}"
+    return one if len(braced) == 1 else "with orthoses"
 
 
 def coordinate_index(name: str) -> int:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
@@ -241,6 +242,19 @@ def test_stops_that_differ_are_told_per_side() -> None:
     stops = [text.split(":")[0] for label, text in rows if label == "stops"]
     assert stops == ["right", "left"]
     assert not [label for label, _ in rows if label == "real springs"], "none are listed"
+
+
+def test_stops_that_barefoot_strides_would_load_are_told() -> None:
+    (note,) = [n for n in check_file("mapd-orthosis").notes if "hard stops would carry" in n]
+    patient = load_patient(PATIENT)
+    beyond = -0.13 - patient.recorded["barefoot"].joint_ranges["ankle_r"][0]
+    assert f"right dorsiflexion stop passed by {np.rad2deg(beyond):.1f} deg" in note
+    # 1 N m of preload and 0.105 rad of way, with the softest and the stiffest spring
+    softest, stiffest = (200 * beyond / (200 * beyond + 1 + 0.105 * k) for k in (5, 92))
+    assert f"carry {100 * stiffest:.0f} to {100 * softest:.0f} %" in note
+    assert "plantarflexion" not in note
+    held = check_file("mapd-orthosis", changes=("variation.scale={orthosis.stop_stiffness: 0.02}",))
+    assert not [n for n in held.notes if "hard stops would carry" in n], "springs carry more"
 
 
 def test_barefoot_nothing_is_told_of_orthoses(child: Path) -> None:

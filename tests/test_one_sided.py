@@ -34,10 +34,11 @@ from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.figures.save import make_figure
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.stride import stride_of
-from pathwalker_cli.studies.judge import verdict_of
+from pathwalker_cli.studies.judge import _Judge, _stops, verdict_of
 from pathwalker_cli.studies.landscape import LandscapeStudy, on_worn_side
+from pathwalker_cli.studies.measures import measures
 from pathwalker_cli.studies.sensitivity import default_places
-from pathwalker_cli.studies.verdict import verdict_of_metrics
+from pathwalker_cli.studies.verdict import LOADED, STIFFER, verdict_of_metrics
 
 SHIPPED = "sreenivasa2017-patient"
 LEFT = {"dorsiflexion_stop": {"left": -0.12}, "plantarflexion_stop": 0.09, "sides": ["left"]}
@@ -230,12 +231,35 @@ def test_a_run_speaks_of_the_side_that_is_worn(solution: GaitSolution, tmp_path:
     assert run.verdict == verdict_of_metrics(run.run.metrics)
     assert all(name.endswith("left") for name in run.springs)
     page = gait_page(runs, ())
-    assert "with an orthosis left" in page.title
+    assert "with an orthosis on the left" in page.title
     (fitting,) = [s for s in page.sections if s.title.startswith("Springs to fit")]
     assert [row.cells[0] for row in fitting.tables[0].rows] == ["K_D left", "K_P left"]
     html = page_html(page)
     assert "K_D right" not in html
     assert "nan" not in html.lower().replace("dominan", "")
+
+
+def test_a_stiffer_stop_changes_what_solves_say(solution: GaitSolution) -> None:
+    resolver = Resolver(solution.case, solution.last_motion, solution.nlp.multipliers, 1e-8)
+    judge = _Judge(resolver)
+    found = {stop.stop: stop for stop in map(judge.stop, _stops(judge.optimum.series))}
+    stop = found["dorsiflexion"]
+    assert stop.carried > LOADED
+    place, step = "orthosis.stop_stiffness.dorsiflexion.left", 2e-3
+    ends = [
+        resolver.resolve(solution.case.with_values({"variation.scale": {place: 1.0 + sign * step}}))
+        for sign in (-1, 1)
+    ]
+    assert all(end.converged for end in ends)
+    below, above = (measures(end) for end in ends)
+    for name, change in stop.stiffer.items():
+        slope = (above[name] - below[name]) / (2.0 * step)
+        size = abs(judge.optimum.cost) if name == "cost" else 1.0
+        assert change == pytest.approx(STIFFER * slope / size, rel=0.02, abs=1e-4), name
+    stiffer = judge.stiffer_stops(tuple(found.values()))
+    assert stiffer is not None
+    assert stiffer.changes.keys() == stop.stiffer.keys()
+    assert judge.stiffer_stops(()) is None
 
 
 def test_figures_draw_the_side_that_is_worn(solution: GaitSolution) -> None:
@@ -244,7 +268,7 @@ def test_figures_draw_the_side_that_is_worn(solution: GaitSolution) -> None:
     frames = gait_frames(series, "run", "mapd-orthosis", 8)
     shapes = [shape for shape in drawing(frames).shapes if shape.kind in ("shell", "spring")]
     assert {shape.side for shape in shapes} == {"left"}
-    assert "with an orthosis left" in who(frames)
+    assert "with an orthosis on the left" in who(frames)
     names = [part.name for part in walker_geometry(series.walker).geometryObjects]
     assert [name for name in names if name.startswith("shell")] == ["shell_l"]
 

@@ -15,6 +15,7 @@ from pathwalker_cli.report.springs import left_open, prescribed, recommended
 from pathwalker_cli.report.summaries import SensitivitySummary, UncertaintySummary
 from pathwalker_cli.results.text import interesting
 from pathwalker_cli.studies.sensitivity.result import SHOWN, label_of
+from pathwalker_cli.studies.verdict import stop_warnings
 
 _KINDS = {
     "dorsiflexion": "the spring against the shin leaning forward (K_D)",
@@ -169,12 +170,8 @@ def _hinges(run: ReportRun) -> Iterator[str]:
     verdict = run.verdict
     if verdict is None:
         return
-    longest = max((stop.share for stop in verdict.stops if stop.excess > 0.0), default=0.0)
-    if longest:
-        yield (
-            f"{named}the ankles press on the hard stops for up to {100 * longest:.0f} % of the "
-            "stride, so the stiffness of the stops counts as well as that of the springs"
-        )
+    for warning in stop_warnings(verdict):
+        yield f"{named}{warning}"
     if verdict.starts < 2:
         yield f"{named}one local optimum; others were not searched for (starts: 8 does)"
 

@@ -16,7 +16,7 @@ from pathwalker_cli.report.springs import spring_section
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import expanded, measures_in
-from pathwalker_cli.studies.verdict import snapped_warning
+from pathwalker_cli.studies.verdict import snapped_warning, stop_warnings
 
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
@@ -71,6 +71,11 @@ def _warnings(runs: Sequence[ReportRun]) -> list[str]:
             )
         if run.verdict is not None and (warning := snapped_warning(run.verdict)):
             warnings.append(f"{run.label}, springs to take: {warning}")
+        if run.verdict is not None and next(stop_warnings(run.verdict), ""):
+            warnings.append(
+                f"{run.label}: hard stops carry much of what the orthoses exert; what the answer "
+                "hangs on tells how much, and what stiffer ones would change"
+            )
         if _coarse(run):
             warnings.append(
                 f"{run.label}: an independent integrator misses the mesh by more than the config "

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.gait.neighbourhood import Derivative
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.stride.measure import Measure
@@ -29,6 +30,13 @@ Ranges = Mapping[str, tuple[float, float]]
 def all_measures(optimum: Optimum) -> dict[str, float]:
     """Return the cost and every single number of the gait."""
     return {"cost": optimum.cost, **numbers_of(stride_of(optimum.series))}
+
+
+def slopes(at: Derivative) -> dict[str, float]:
+    """Return the derivatives of the cost and of every single number of the gait."""
+    below, above = all_measures(at.below), all_measures(at.above)
+    found = {key: (above[key] - below[key]) / (2.0 * at.step) for key in above if key in below}
+    return {**found, "cost": at.cost}
 
 
 def measures(optimum: Optimum) -> dict[str, float]:

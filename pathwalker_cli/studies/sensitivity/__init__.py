@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final
 from pathwalker_cli.case import Case
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.gait.bounds import held
-from pathwalker_cli.gait.neighbourhood import Derivative, Neighbourhood
+from pathwalker_cli.gait.neighbourhood import Neighbourhood
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.gait.symmetry import require_symmetry
@@ -31,7 +31,7 @@ from pathwalker_cli.studies.base import (
     require_optimum,
     resolver_of,
 )
-from pathwalker_cli.studies.measures import all_measures, measures
+from pathwalker_cli.studies.measures import all_measures, measures, slopes
 from pathwalker_cli.studies.neighbours import Journal
 from pathwalker_cli.studies.sensitivity.result import (
     FILES,
@@ -161,17 +161,10 @@ def _sensitivity(around: Neighbourhood, place: str, base: Mapping[str, float]) -
         derivative, unit = around.by_unknown(unknown), around.optimum.value(unknown)
     else:
         derivative, unit = around.by_factor(place), 1.0
-    derivatives = {key: unit * slope for key, slope in _slopes(derivative).items()}
+    derivatives = {key: unit * slope for key, slope in slopes(derivative).items()}
     elasticities = {key: slope / base[key] if base[key] else None
                     for key, slope in derivatives.items()}  # fmt: skip
     return Sensitivity(place, value, derivatives, elasticities)
-
-
-def _slopes(at: Derivative) -> dict[str, float]:
-    """Return the derivatives of all measures."""
-    below, above = all_measures(at.below), all_measures(at.above)
-    slopes = {key: (above[key] - below[key]) / (2.0 * at.step) for key in above if key in below}
-    return {**slopes, "cost": at.cost}
 
 
 def _unknown(optimum: Optimum, place: str) -> Unknown | None:
