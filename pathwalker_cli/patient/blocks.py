@@ -30,6 +30,10 @@ Offset = Annotated[
 Strength = Annotated[float, Quantity("N m", 0.1, 500.0)]
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
 Stiffness = Annotated[float, Quantity("N m/rad", 1.0, 1000.0, below="is it in N m per degree?")]
+_StopStiffness = Annotated[
+    float,
+    Quantity("N m/rad", 1.0, 5000.0, "is it in N m per degree?", "no stop is rigid: measure it"),
+]
 _Radius = Annotated[float, Quantity("m", 0.0, 0.5, above="is it in centimetres or millimetres?")]
 Roundness = Annotated[float, Quantity("", 0.05, 50.0)]
 """Radius of a sole where it lies flat, beside its length."""
@@ -156,6 +160,13 @@ class Springs(YamlModel):
 _Stiffnesses = Annotated[tuple[Stiffness, Stiffness], AS_TUPLE]
 
 
+class Stops(YamlModel):
+    """Stiffness of the hard stop of each direction [N m/rad]."""
+
+    dorsiflexion: Worn[_StopStiffness]
+    plantarflexion: Worn[_StopStiffness]
+
+
 class SpringRange(YamlModel):
     """Stiffness that the joint's springs can be tuned to [N m/rad], and who says so."""
 
@@ -228,7 +239,7 @@ class OrthosisData(YamlModel):
     ]
     dorsiflexion_stop: Worn[Annotated[float, _DORSIFLEXION]]
     plantarflexion_stop: Worn[Annotated[float, _PLANTARFLEXION]]
-    stop_stiffness: Springs
+    stop_stiffness: Stops
     stiffness_guess: Springs
     stiffness_range: SpringRange
     springs: SpringSet | None = None

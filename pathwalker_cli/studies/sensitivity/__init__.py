@@ -20,7 +20,7 @@ from pathwalker_cli.gait.symmetry import require_symmetry
 from pathwalker_cli.io.fields import Quantity, Sides
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient.blocks import SegmentLengths, Springs, Strengths
+from pathwalker_cli.patient.blocks import SegmentLengths, Stops, Strengths
 from pathwalker_cli.patient.variation import Variation, varied
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import (
@@ -72,7 +72,7 @@ def default_places(patient: Patient, with_orthosis: bool) -> tuple[str, ...]:
     if with_orthosis:
         places += [f"orthosis.{name}" for name in _ORTHOSIS]
         places += [f"orthosis.{n}.{s}" for n in _STOPS for s in patient.braced("orthosis")]
-        places += [f"orthosis.stop_stiffness.{name}" for name in Springs.model_fields]
+        places += [f"orthosis.stop_stiffness.{name}" for name in Stops.model_fields]
     places += ["strengths"]
     for name in Strengths.model_fields:
         sides = ("",) if name.startswith("lumbar") else (".right", ".left")
