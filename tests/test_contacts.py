@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import casadi as ca
@@ -18,7 +19,13 @@ from pathwalker_cli.gait.solve import solve_study
 from pathwalker_cli.gait.symmetry import full_stride
 from pathwalker_cli.model.backends import available_backends, rigid_body_functions
 from pathwalker_cli.model.backends.functions import RigidBodyFunctions
-from pathwalker_cli.model.contact import PATTERNS, PHASES, contact_pattern, mirrored_phase
+from pathwalker_cli.model.contact import (
+    PHASES,
+    USES,
+    Use,
+    contact_pattern,
+    mirrored_phase,
+)
 from pathwalker_cli.model.parts import Parts
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
@@ -214,8 +221,9 @@ def test_a_sole_lies_between_its_ends_and_tends_to_them() -> None:
 
 def test_patterns_hold_together() -> None:
     assert contact_pattern().phases == PHASES
-    assert len(PATTERNS) == 10
-    for pattern in PATTERNS:
+    others = Use(("flat", "toe"), ("toe", "flat")), Use(("heel", "flat", "toe"), ("heel",))
+    uses = product((*USES.values(), *others), repeat=2)
+    for pattern in (*(contact_pattern("points", pair) for pair in uses), contact_pattern("sole")):
         assert len(set(pattern.names)) == len(pattern.phases)
         first, last = pattern.phases[0], pattern.phases[-1]
         assert last.feet == ("right", "left")
@@ -238,7 +246,7 @@ def test_patterns_hold_together() -> None:
 
 def coarse(feet: str, contact: Any, problem: str = "mapd-barefoot") -> StudyConfig:
     """Return a study on a coarse mesh of the pattern of these feet."""
-    uses = contact["right"], contact["left"]
+    uses = USES[contact["right"]], USES[contact["left"]]
     pattern = contact_pattern("sole" if feet == "sole" else "points", uses)
     mesh = (10 if feet == "sole" else 3,) * len(pattern.phases)  # a round foot is quick
     values = {"model.feet": feet, "model.contact": contact, "mesh.intervals": mesh,

@@ -17,6 +17,15 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 T = TypeVar("T")
 
+
+@dataclass(frozen=True)
+class Words:
+    """Annotation: type and allowed values in words, where the type does not tell them."""
+
+    kind: str
+    allowed: str
+
+
 _WRITTEN: Final = re.compile(r"([-+]?\d+(?:\.\d*)?) *(deg|N m/deg)")
 _PER_DEGREE: Final = {
     ("rad", "deg"): math.pi / 180.0,
@@ -206,6 +215,8 @@ _KINDS: Final[dict[Any, str]] = {
 def described(annotation: Any, metadata: list[Any]) -> tuple[str, str]:
     """Return the type and the allowed values of an annotation in words."""
     for entry in metadata:
+        if isinstance(entry, Words):
+            return entry.kind, entry.allowed
         if isinstance(entry, Quantity):
             unit = f", {entry.unit}" if entry.unit else ""
             return f"number{unit}", f"{entry.lower:g} to {entry.upper:g}"
