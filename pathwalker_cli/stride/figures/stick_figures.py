@@ -45,7 +45,7 @@ def stick_figures(series: GaitSeries, reference: Reference | None = None) -> Fig
         ax.grid(visible=False)
     force = f"ground force; 1 body weight is as\nlong as {style.FORCE_LENGTH:g} pelvis heights"
     force_look = {"color": style.FORCE_COLOUR, "linewidth": 1.4}
-    style.legend(fig, [*_leg_entries(), style.entry(force, **force_look)])
+    style.legend(fig, [*_leg_entries(), style.entry(force, **force_look), *_brace_entry(stride)])
     return fig
 
 
@@ -63,10 +63,13 @@ def walks_figure(walks: Sequence[tuple[str, Stride]]) -> Figure:
         ax.set_title(label, loc="left", weight="bold")
         ax.grid(visible=False)
     panels[-1].set_xlabel("right gait cycle from the right foot strike [%], figures moved apart")
-    worn = any(stride.walker.device.worn for _, stride in walks)
-    brace = [style.entry("orthosis", **_BRACE)] if worn else []
-    style.legend(fig, [*_leg_entries(), *brace], columns=3)
+    brace = [entry for _, stride in walks for entry in _brace_entry(stride)]
+    style.legend(fig, [*_leg_entries(), *brace[:1]], columns=3)
     return fig
+
+
+def _brace_entry(stride: Stride) -> list[Any]:
+    return [style.entry("orthosis", **_BRACE)] if stride.walker.device.worn else []
 
 
 def _leg_entries() -> list[Any]:
