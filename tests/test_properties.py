@@ -115,8 +115,9 @@ def close(found: Any, wanted: Any, share: float = WRITTEN) -> None:
 def test_segment_masses_add_up_to_the_body(patient: Patient) -> None:
     """The regressions give 99.98 % of the body mass at every age, and the orthoses add theirs."""
     body = 0.9998 * patient.body_mass
-    worn = patient.require_orthosis().mass
-    for condition, mass in (("barefoot", body), ("orthosis", body + 2 * (worn.shank + worn.foot))):
+    device = patient.require_orthosis().mass
+    worn = sum(part[side] for part in (device.shank, device.foot) for side in SIDES)
+    for condition, mass in (("barefoot", body), ("orthosis", body + worn)):
         masses = [part.mass for part in segments(patient, condition)]
         assert sum(masses) == pytest.approx(mass, rel=1e-12)
         assert build_walker(patient, condition).total_mass == pytest.approx(mass, rel=WRITTEN)

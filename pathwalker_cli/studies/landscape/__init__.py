@@ -219,7 +219,7 @@ def landscape_of(study: LandscapeStudy, run: Run, work: Work) -> Landscape:
         NotConvergedError: If the user stopped it, or there is nothing to begin with.
     """
     near = Neighbours(run, work.folder / "points", study.max_iterations, work.report)
-    study = on_worn_side(study, near.optimum.walker)
+    study = on_worn_side(study, near.optimum.solver.walker)
     springs, (k_d, k_p) = _axes(study, near.optimum.solver)
     both = near.optimum.stiffness.reshape(2, 2)[:, [SIDES.index(side) for side in study.sides]]
     graph = grid(k_d, k_p, tuple(np.exp(np.log(both).mean(axis=1)).tolist()))

@@ -147,7 +147,8 @@ class Tradeoff:
     @property
     def springs(self) -> tuple[str, ...]:
         """Springs that there are; none barefoot."""
-        return tuple(name for name in STIFFNESSES if self.optimum.get(name) is not None)
+        worn = STIFFNESSES if self.condition == "orthosis" else ()
+        return tuple(name for name in worn if self.optimum.get(name) is not None)
 
 
 def judged(points: Sequence[FrontPoint]) -> tuple[FrontPoint, ...]:
