@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import CONDITIONS, SIDES, Condition
+from pathwalker_cli.conventions import CONDITIONS, SIDES, STIFFNESSES, Condition
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.backends import rigid_body_functions
 from pathwalker_cli.model.backends.functions import RigidBodyFunctions
@@ -122,6 +122,11 @@ class Walker:
     def orthosis(self) -> dict[Side, OrthosisSide]:
         """All but the springs of the orthoses, by the side that wears one."""
         return {side: each.fixed(self.values) for side, each in self.device.elements.items()}
+
+    @property
+    def springs(self) -> tuple[str, ...]:
+        """Names of the springs that are worn, in the order of `conventions.STIFFNESSES`."""
+        return tuple(n for n in STIFFNESSES if n.rpartition("_")[2] in self.device.elements)
 
     @property
     def stiffness(self) -> np.ndarray:

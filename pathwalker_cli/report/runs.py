@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.conventions import STIFFNESSES, Side
+from pathwalker_cli.conventions import Side
 from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.evaluation.evaluate import Evaluation, evaluate_gait
 from pathwalker_cli.evaluation.run import run_and_gait
@@ -52,7 +52,7 @@ class ReportRun:
     @property
     def springs(self) -> tuple[str, ...]:
         """The springs that are worn, in the order of `conventions.STIFFNESSES`."""
-        return tuple(name for name in STIFFNESSES if name.rpartition("_")[2] in self.braced)
+        return self.evaluation.gait.walker.springs
 
     @property
     def date(self) -> str:

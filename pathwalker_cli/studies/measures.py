@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-import numpy as np
-
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.neighbourhood import Derivative
 from pathwalker_cli.gait.resolve import Optimum
@@ -61,10 +59,10 @@ def measures_with(units: Mapping[str, str]) -> tuple[Measure, ...]:
 def ranges_of(optimum: Optimum) -> dict[str, tuple[float, float]]:
     """Return the allowed range of every spring and unknown; none where it follows another one."""
     ranges = dict(optimum.solver.bounds.ranges)
-    known = zip(STIFFNESSES, optimum.stiffness.tolist(), strict=False)  # none barefoot
-    springs = {name: value for name, value in known if np.isfinite(value)}
+    springs = optimum.solver.walker.springs
     if not all(name in ranges for name in springs):
-        ranges = {name: (value, value) for name, value in springs.items()} | ranges
+        values = dict(zip(STIFFNESSES, optimum.stiffness.tolist(), strict=True))
+        ranges = {name: (values[name], values[name]) for name in springs} | ranges
     return {name: ranges[name] for name in dict.fromkeys((*springs, *ranges))}
 
 
