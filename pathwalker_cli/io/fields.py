@@ -37,7 +37,11 @@ _PER_DEGREE: Final = {
 _LARGEST: Final = sys.float_info.max
 
 
-AS_TUPLE: Final = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+AS_TUPLE: Final = BeforeValidator(_as_tuple)
 """Annotation of a tuple below `Sides`, where strict validation no longer sees YAML's lists."""
 
 
