@@ -49,8 +49,9 @@ _ABOUT: Final = {
     "estimates them from recordings. Given, the block must be complete.",
     "examination": "Passive range of motion from the couch, in degrees. Counts in problems with `model.tissue: true`; "
     "what is left out is that of typical children.",
-    "orthosis": "Needed for problems with orthoses. The same on both legs but for the stops. `orthosis:` may also "
-    "be the path of a YAML file with this block, relative to the patient's file, that several patients share.",
+    "orthosis": "Needed for problems with orthoses. One number counts for every leg that wears one, and any may differ by "
+    "side. With `sides: [left]` the right leg has no spring, stop, mass or sole of an orthosis, and nothing may be given for it. "
+    "`orthosis:` may also be the path of a YAML file with this block, relative to the patient's file, that several patients share.",
     "recorded": "What was recorded, per condition: `recorded.barefoot` and `recorded.orthosis` have the same keys. "
     "The barefoot ones give the bounds of predictions: least walking speed and joint ranges.",
 }
@@ -86,7 +87,8 @@ MEANINGS: Final = {
     "segment_lengths.foot": "heel marker to toe marker",
     "contact_points.barefoot.heel": "left out: from foot length and height by proportion",
     "contact_points.barefoot.toe": "",
-    "contact_points.orthosis.heel": "sole of the shoe that is worn with the orthosis; needed with one",
+    "contact_points.orthosis.heel": "sole of the shoe that is worn with the orthosis; needed with one. A foot without orthosis is "
+    "bare, unless its own pair is given",
     "contact_points.orthosis.toe": "",
     "rocker_radius.heel": "left out: 0.18 of the foot's length",
     "rocker_radius.toe": "left out: 0.18 of the foot's length",
@@ -107,15 +109,16 @@ MEANINGS: Final = {
     "examination.dorsiflexion_knee_flexed": "with the knee at 90; typical 32",
     "orthosis.cuff_height": "middle of the cuff above the hinge, for its force on the leg; left out: 0.7 of the shank",
     "orthosis.cuff_area": "area on which the cuff presses, in front or behind; left out: 0.06 of the squared shank",
-    "orthosis.mass.shank": "what orthosis and shoe add to each shank",
-    "orthosis.mass.foot": "the same of each foot",
+    "orthosis.sides": "the legs that wear one",
+    "orthosis.mass.shank": "what orthosis and shoe add to the shank",
+    "orthosis.mass.foot": "the same of the foot",
     "orthosis.neutral_angle": "ankle angle at which the springs give no torque",
     "orthosis.free_play": "width of the play around the neutral angle",
     "orthosis.preload_torque": "torque at the edge of the free play, where the spring begins to work",
     "orthosis.dorsiflexion_stop": "ankle angle of the hard stop",
     "orthosis.plantarflexion_stop": "ankle angle of the hard stop",
-    "orthosis.stop_stiffness.dorsiflexion": "behind the stop",
-    "orthosis.stop_stiffness.plantarflexion": "behind the stop",
+    "orthosis.stop_stiffness.dorsiflexion": "of the stop itself, shell and stirrup; measured, see [own orthosis](own-orthosis.md)",
+    "orthosis.stop_stiffness.plantarflexion": "the same in plantarflexion",
     "orthosis.stiffness_guess.dorsiflexion": "K_D at which the search begins",
     "orthosis.stiffness_guess.plantarflexion": "K_P at which the search begins",
     "orthosis.stiffness_range.dorsiflexion": "K_D that can be had",

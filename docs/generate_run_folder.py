@@ -138,7 +138,9 @@ PROOF: Final = {
     "bound_sources": "by quantity, its bounds and where they come from",
     "notes": "what was filled in or overridden in the patient's file",
     "verdict": "how sure the springs are, see [how sure is a spring](sensitivity.md): `springs` (region [N m/rad], limit, "
-    "gradient and curvature of the cost relative to its size), `stops`, `snapped` to real springs, `optima`; null "
+    "gradient and curvature of the cost relative to its size), `stops` (how far and how long they are exceeded, largest torque "
+    "[N m], share of the impulse carried, stiffness, and `stiffer`: what a tenth more of it changes, to first order, SI units, the cost "
+    "as a share), `stiffer_stops` (the same with twice the stiffness, solved again), `snapped` to real springs, `optima`; null "
     "where there is nothing to judge",
     "local_optima": "where all starts ended, best first; empty for a single start",
 }

@@ -10,7 +10,12 @@ from pathwalker_cli.paths import source_stamps
 
 if TYPE_CHECKING:
     from pathwalker_cli.case import load_case
-    from pathwalker_cli.extensions import register_elements, register_goal, register_measure
+    from pathwalker_cli.extensions import (
+        register_elements,
+        register_goal,
+        register_measure,
+        register_use,
+    )
     from pathwalker_cli.gait.solve import solve_study
     from pathwalker_cli.model.walker import build_walker
     from pathwalker_cli.patient import load_patient
@@ -26,6 +31,7 @@ __all__ = [
     "register_elements",
     "register_goal",
     "register_measure",
+    "register_use",
     "run_study",
     "solve_study",
 ]
@@ -41,6 +47,7 @@ _HOMES = {
     "register_elements": "pathwalker_cli.extensions",
     "register_goal": "pathwalker_cli.extensions",
     "register_measure": "pathwalker_cli.extensions",
+    "register_use": "pathwalker_cli.extensions",
     "run_study": "pathwalker_cli.studies.run",
     "solve_study": "pathwalker_cli.gait.solve",
 }

@@ -69,8 +69,11 @@ class Case:
         """What the walker is made of."""
         from pathwalker_cli.model.parts import Parts  # takes long: only who needs it
 
-        model = self.config.model
-        return Parts(self.config.condition, model.tissue, model.feet, model.uses, model.elements)
+        model, condition = self.config.model, self.config.condition
+        return Parts(
+            condition, model.tissue, model.feet, model.uses, model.elements,
+            self.patient.braced(condition),
+        )  # fmt: skip
 
     def walker(self, backend: str = "auto") -> Walker:
         """Return the walking model of the patient in the condition of the problem.

@@ -5,6 +5,7 @@ Axes and signs stand in `model.skeleton`, from which the generalised coordinates
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Final, Literal
 
 import numpy as np
@@ -58,6 +59,14 @@ CONTACT_FORCES: Final = contact_pattern().force_names
 
 CONDITIONS: Final = ("barefoot", "orthosis")
 Condition = Literal["barefoot", "orthosis"]
+
+
+def worn_words(braced: Collection[Side]) -> str:
+    """Return in words what is worn if these sides wear an orthosis."""
+    if not braced:
+        return "barefoot"
+    one = f"with an orthosis on the {min(braced)}"
+    return one if len(braced) == 1 else "with orthoses"
 
 
 def coordinate_index(name: str) -> int:

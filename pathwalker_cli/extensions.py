@@ -1,4 +1,4 @@
-"""Goals, measures and force elements from outside: of a script, or of an installed package.
+"""Goals, measures, force elements and patterns of contact from outside: a script's or a package's.
 
 A script registers them before it reads a config; a package does so where an entry point of the
 group `pathwalker` says, see `installed`.
@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Container, Sequence
-from typing import Final
+from typing import Final, get_args
 
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.gait import costs
 from pathwalker_cli.gait.costs import CostTerm
 from pathwalker_cli.model import elements
+from pathwalker_cli.model.contact import USES, Posture, Use
 from pathwalker_cli.model.elements import ForceElement
 from pathwalker_cli.stride import measures
 from pathwalker_cli.stride.measure import Measure
@@ -61,6 +62,29 @@ def register_elements(name: str, parts: Sequence[ForceElement]) -> None:
     """
     _require_new(name, "element", elements.REGISTERED)
     elements.REGISTERED[name] = tuple(parts)
+
+
+def register_use(name: str, single: Sequence[Posture], landing: Sequence[Posture]) -> None:
+    """Let configs use a foot in a pattern of this name, in `model.contact`.
+
+    Runs keep what it stands for: they are read without it.
+
+    Args:
+        name: What configs call it.
+        single: What of the foot is on the ground while the other one swings, in order.
+        landing: What of it is after it has landed, until the other one leaves the ground.
+
+    Raises:
+        InputError: If the name is none or taken, or no foot can do this.
+    """
+    _require_new(name, "use", USES)
+    use = Use(tuple(single), tuple(landing))
+    if strangers := {*use.single, *use.landing} - set(get_args(Posture)):
+        raise InputError(f"names '{min(strangers)}'", where=f"use {name}",
+                         allowed="heel, flat, toe")  # fmt: skip
+    if use.fault:
+        raise InputError(use.fault, where=f"use {name}")
+    USES[name] = use
 
 
 def _require_new(name: str, kind: str, known: Container[str]) -> None:

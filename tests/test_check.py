@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
@@ -226,8 +227,8 @@ def test_an_orthosis_is_told_in_degrees_with_directions(child: Path, file: str) 
     text = " ".join(run(child / file).output.split())
     for part in (
         "neutral angle 1.1 deg dorsiflexion, play 0.6 deg around it, preload 1 N m either way",
-        "stops right and left: 7.4 deg dorsiflexion to 5.7 deg plantarflexion",
-        "springs K_D 5 to 92, K_P 5 to 92 N m/rad",
+        "stops right and left: 7.4 deg dorsiflexion to 5.7 deg plantarflexion, as stiff as 200 and",
+        "springs right and left: K_D 5 to 92, K_P 5 to 92 N m/rad",
         "real springs K_D flexible 40.1, stiff 91.7; K_P softest 5, flexible 40.1 N m/rad",
     ):
         assert part in text, part
@@ -243,11 +244,24 @@ def test_stops_that_differ_are_told_per_side() -> None:
     assert not [label for label, _ in rows if label == "real springs"], "none are listed"
 
 
+def test_stops_that_barefoot_strides_would_load_are_told() -> None:
+    (note,) = [n for n in check_file("mapd-orthosis").notes if "hard stops would carry" in n]
+    patient = load_patient(PATIENT)
+    beyond = -0.13 - patient.recorded["barefoot"].joint_ranges["ankle_r"][0]
+    assert f"right dorsiflexion stop passed by {np.rad2deg(beyond):.1f} deg" in note
+    # 1 N m of preload and 0.105 rad of way, with the softest and the stiffest spring
+    softest, stiffest = (200 * beyond / (200 * beyond + 1 + 0.105 * k) for k in (5, 92))
+    assert f"carry {100 * stiffest:.0f} to {100 * softest:.0f} %" in note
+    assert "plantarflexion" not in note
+    held = check_file("mapd-orthosis", changes=("variation.scale={orthosis.stop_stiffness: 0.02}",))
+    assert not [n for n in held.notes if "hard stops would carry" in n], "springs carry more"
+
+
 def test_barefoot_nothing_is_told_of_orthoses(child: Path) -> None:
     assert "neutral angle" not in run(child / "mapd-barefoot.yaml").output
     assert check_file(str(child / "mapd-barefoot.yaml")).content["orthosis"] is None
     content = check_file(str(child / "mapd-orthosis.yaml")).content
-    assert content["orthosis"]["neutral_angle"] == -0.02
+    assert content["orthosis"]["neutral_angle"] == {"right": -0.02, "left": -0.02}
 
 
 @pytest.mark.parametrize(

@@ -174,7 +174,7 @@ def test_readme_patient_and_study_are_accepted(tmp_path: Path) -> None:
     (tmp_path / "my-patient.yaml").write_text(patient, encoding="utf-8")
     (tmp_path / "my-study.yaml").write_text(study, encoding="utf-8")
     config = load_config(tmp_path / "my-study.yaml", "mapd-orthosis")
-    assert load_patient(config.patient).require_orthosis().free_play == 0.01
+    assert load_patient(config.patient).require_orthosis().free_play.left == 0.01
 
 
 def test_readme_has_no_unfilled_figure() -> None:
@@ -289,9 +289,10 @@ def test_own_patient_and_orthosis_are_accepted(tmp_path: Path) -> None:
     assert len(config.bounds.stiffness) == 4
     page = text_of("docs/own-orthosis.md")
     orthosis = load_patient(config.patient).require_orthosis()
-    assert f"`neutral angle {angle_words(orthosis.neutral_angle)}`" in page
+    middle = angle_words(orthosis.neutral_angle["right"])
+    assert f"`neutral angle {middle}`" in page
     guessed = yaml.safe_load(hinge) | {"free_play": 0.01, "preload_torque": 0.0}
-    assert validate(guessed, OrthosisData).preload_torque == 0.0
+    assert validate(guessed, OrthosisData).preload_torque.left == 0.0
     with pytest.raises(ConfigError, match="free_play"):
         validate(guessed | {"free_play": 0.0}, OrthosisData)
     assert validate(yaml.safe_load(torques), InverseDynamicsConfig).patient == "anna/"

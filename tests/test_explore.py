@@ -34,9 +34,13 @@ from pathwalker_cli.studies.run import run_study
 from report_runs import write_made_run
 
 K_D = "orthosis.stiffness_guess.dorsiflexion.right"
-NEUTRAL = "orthosis.neutral_angle"
+NEUTRAL = "orthosis.neutral_angle.right"
 TIGHT = "examination.popliteal_angle.left"
-SAME = ("orthosis.mass.foot", "strengths.hip_extension.right", "examination.popliteal_angle.right")
+SAME = (
+    "orthosis.mass.foot.left",
+    "strengths.hip_extension.right",
+    "examination.popliteal_angle.right",
+)
 SPEED = "bounds.least_walking_speed"
 
 
@@ -77,13 +81,13 @@ def test_dials_are_what_the_run_has(session: Session) -> None:
     assert {"Orthosis", "Wish", "Strength", "Tightness"} <= groups
     keys = [dial.key for dial in session.dials]
     assert len(keys) == len(set(keys))
-    assert {K_D, NEUTRAL, TIGHT, SPEED, "cost.goals.time", "orthosis.mass.foot",
+    assert {K_D, NEUTRAL, TIGHT, SPEED, "cost.goals.time", "orthosis.mass.foot.left",
             "strengths.hip_flexion.left", "strengths.lumbar_flexion"} <= set(keys)  # fmt: skip
     assert all(dial.low <= dial.value <= dial.high for dial in session.dials)
 
 
-@pytest.mark.parametrize("key", [NEUTRAL, TIGHT, "orthosis.mass.foot", "strengths.hip_flexion.left",
-                                 "orthosis.dorsiflexion_stop.left",
+@pytest.mark.parametrize("key", [NEUTRAL, TIGHT, "orthosis.mass.foot.left",
+                                 "strengths.hip_flexion.left", "orthosis.dorsiflexion_stop.left",
                                  "examination.dorsiflexion_knee_flexed.right"])  # fmt: skip
 def test_a_dial_sets_its_own_number_and_no_other(session: Session, key: str) -> None:
     settings = turned(session, key)
@@ -137,7 +141,7 @@ def test_the_springs_may_be_left_to_the_problem(session: Session) -> None:
 def test_what_cannot_be_leaves_everything_where_it_was(session: Session) -> None:
     before = session.optimum
     with pytest.raises(InputError, match="free_play"):
-        session.solve({**settings_of(session.dials), "orthosis.free_play": -1.0})
+        session.solve({**settings_of(session.dials), "orthosis.free_play.right": -1.0})
     assert session.optimum is before
     end = session.solve({**settings_of(session.dials), SPEED: 8.0e-1, "cost.goals.time": 1e6})
     if not end.converged:
@@ -206,7 +210,7 @@ def test_what_is_refused_is_said_and_what_is_shown_is_saved(
     line = answers(
         run,
         tmp_path,
-        move(1, {**settings, "orthosis.free_play": -1.0}),
+        move(1, {**settings, "orthosis.free_play.right": -1.0}),
         {"kind": "save", "number": 1, "name": "as-it-was"},
     )
     refusal = next(m for m in line.answers if m["kind"] == "refused")

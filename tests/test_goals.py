@@ -102,7 +102,8 @@ def test_cuffs_press_with_the_torque_over_their_height() -> None:
     assert found["peak_shin_force_right"] == pytest.approx(max(torque[:, 0].max(), 0.0) / height)
     assert found["peak_calf_force_right"] == pytest.approx(max(-torque[:, 0].min(), 0.0) / height)
     largest = max(found["peak_shin_force_right"], found["peak_calf_force_right"])
-    assert found["peak_cuff_pressure_right"] == pytest.approx(largest / walker.patient.cuff_area)
+    area = walker.patient.cuff_area("right")
+    assert found["peak_cuff_pressure_right"] == pytest.approx(largest / area)
     heights = np.array([walker.patient.cuff_height(side) for side in ("right", "left")])
     squares = ((torque / heights / weight) ** 2).sum(axis=1)
     value = goal_values(series.motion, walker, {})["cuff_load"]

@@ -57,7 +57,7 @@ def test_shipped_patient_is_read() -> None:
     assert strength["ankle_flexion_l"] == 5.85053
     assert strength["lumbar_flexion"] == 17.19329
     assert patient.require_orthosis().dorsiflexion_stop["right"] == -0.13
-    assert patient.require_orthosis().stiffness_range.dorsiflexion == (5.0, 92.0)
+    assert patient.require_orthosis().stiffness_range.dorsiflexion.left == (5.0, 92.0)
     assert len(patient.notes) == 1
 
 
@@ -237,9 +237,9 @@ def test_angles_may_be_written_in_degrees_where_they_say_so(tmp_path: Path) -> N
     file.write_text(yaml.safe_dump(content), encoding="utf-8")
     patient = load_patient(file)
     assert patient.orthosis is not None
-    assert patient.orthosis.neutral_angle == pytest.approx(np.deg2rad(-2.0))
+    assert patient.orthosis.neutral_angle.right == pytest.approx(np.deg2rad(-2.0))
     assert patient.orthosis.dorsiflexion_stop.right == pytest.approx(np.deg2rad(-7.5))
-    assert patient.orthosis.stiffness_guess.dorsiflexion == pytest.approx(np.rad2deg(1.6))
+    assert patient.orthosis.stiffness_guess.dorsiflexion.right == pytest.approx(np.rad2deg(1.6))
     assert patient.examination.popliteal_angle.left == 55.0  # type: ignore[union-attr]
     orthosis["neutral_angle"] = "2 degrees"
     file.write_text(yaml.safe_dump(content), encoding="utf-8")

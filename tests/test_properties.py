@@ -115,8 +115,9 @@ def close(found: Any, wanted: Any, share: float = WRITTEN) -> None:
 def test_segment_masses_add_up_to_the_body(patient: Patient) -> None:
     """The regressions give 99.98 % of the body mass at every age, and the orthoses add theirs."""
     body = 0.9998 * patient.body_mass
-    worn = patient.require_orthosis().mass
-    for condition, mass in (("barefoot", body), ("orthosis", body + 2 * (worn.shank + worn.foot))):
+    device = patient.require_orthosis().mass
+    worn = sum(part[side] for part in (device.shank, device.foot) for side in SIDES)
+    for condition, mass in (("barefoot", body), ("orthosis", body + worn)):
         masses = [part.mass for part in segments(patient, condition)]
         assert sum(masses) == pytest.approx(mass, rel=1e-12)
         assert build_walker(patient, condition).total_mass == pytest.approx(mass, rel=WRITTEN)
@@ -250,7 +251,7 @@ def test_torques_follow_strengths_and_stiffnesses(
     close(walker.muscle_torques(q, v, 0.5 * a), 0.5 * muscle, 1e-13)
     signs = np.array([g.torque_sign for g in walker.muscles])
     assert (signs * muscle >= -1e-12 * np.abs(muscle).max()).all()
-    sides = walker.orthosis or ()
+    sides = walker.orthosis.values()
     angle, (k_d, k_p) = np.linspace(-0.6, 0.6, 41), np.random.default_rng(seed).uniform(5, 90, 2)
     for side in sides:
         torque = orthosis_torque(side, angle, k_d, k_p)
@@ -265,16 +266,14 @@ def test_torques_follow_strengths_and_stiffnesses(
 @example(worn=USUAL, share=0.5)
 def test_a_spring_is_a_spring_between_play_and_stop(worn: dict[str, Any], share: float) -> None:
     data = accepted(worn)
-    ranges = data.stiffness_range.dorsiflexion, data.stiffness_range.plantarflexion
+    k_d, k_p = ranges_of(data)
     for i, side in enumerate(sides_of(data)):
-        for k, other in zip(*ranges, strict=True):
+        for k, other in zip(k_d, k_p, strict=True):
             chain = orthosis_curve(side, k, other)
             angle = chain.x[1] + share * (chain.x[2] - chain.x[1])
-            torque = orthosis_torque(
-                side, np.array(angle), k, data.stiffness_range.plantarflexion[0]
-            )
-            edge = data.neutral_angle - data.free_play / 2
-            assert torque == pytest.approx(data.preload_torque + k * (edge - angle), rel=1e-9), i
+            torque = orthosis_torque(side, np.array(angle), k, k_p[0])
+            edge = side.neutral_angle - side.free_play / 2
+            assert torque == pytest.approx(side.preload_torque + k * (edge - angle), rel=1e-9), i
 
 
 # ---- Round trips ---------------------------------------------------------------
@@ -444,16 +443,22 @@ def sides_of(data: OrthosisData) -> tuple[OrthosisSide, ...]:
     """Return the fixed parameters right and left as the walker has them."""
     return tuple(
         OrthosisSide(
-            data.neutral_angle,
-            data.free_play,
-            data.preload_torque,
+            data.neutral_angle[side],
+            data.free_play[side],
+            data.preload_torque[side],
             data.dorsiflexion_stop[side],
             data.plantarflexion_stop[side],
-            data.stop_stiffness.dorsiflexion,
-            data.stop_stiffness.plantarflexion,
+            data.stop_stiffness.dorsiflexion[side],
+            data.stop_stiffness.plantarflexion[side],
         )
         for side in SIDES
     )
+
+
+def ranges_of(data: OrthosisData) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the range of K_D and that of K_P, which are those of both sides."""
+    span = data.stiffness_range
+    return span.dorsiflexion["right"], span.plantarflexion["right"]
 
 
 def check_smooth(chain: BezierChain, tolerance: float = 1e-4) -> None:
@@ -524,10 +529,7 @@ HARD_STOP: Final = {
 def test_torque_of_an_orthosis_is_smooth_and_restoring(worn: dict[str, Any], share: float) -> None:
     """Whatever orthosis is accepted, with whatever springs of its range."""
     data = accepted(worn)
-    k_d, k_p = (
-        low + share * (high - low)
-        for low, high in (data.stiffness_range.dorsiflexion, data.stiffness_range.plantarflexion)
-    )
+    k_d, k_p = (low + share * (high - low) for low, high in ranges_of(data))
     for side in sides_of(data):
         chain = orthosis_curve(side, k_d, k_p)
         check_smooth(chain)
@@ -576,8 +578,7 @@ def orthosis_expansion() -> ca.Function:
 def test_torque_of_an_orthosis_is_smooth_in_its_springs(worn: dict[str, Any], seed: int) -> None:
     """Gradient and Hessian of the solver against finite differences, also across moving knots."""
     data, rng = accepted(worn), np.random.default_rng(seed)
-    ranges = (data.stiffness_range.dorsiflexion, data.stiffness_range.plantarflexion)
-    k = np.array([low + (high - low) * rng.uniform(0.01, 0.99) for low, high in ranges])
+    k = np.array([low + (high - low) * rng.uniform(0.01, 0.99) for low, high in ranges_of(data)])
     function = orthosis_expansion()
     for side in sides_of(data):
         numbers = list(vars(side).values())

@@ -19,19 +19,27 @@ import pathwalker_cli
 from conftest import MadeSolution
 from pathwalker_cli import build_walker, load_case, load_patient
 from pathwalker_cli.errors import ConfigError, InputError, NotConvergedError
-from pathwalker_cli.extensions import register_elements, register_goal, register_measure
+from pathwalker_cli.extensions import (
+    register_elements,
+    register_goal,
+    register_measure,
+    register_use,
+)
 from pathwalker_cli.gait import costs
 from pathwalker_cli.gait.costs import GOALS
 from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.installed import load_installed
 from pathwalker_cli.model import elements
+from pathwalker_cli.model.contact import USES
 from pathwalker_cli.model.elements import plain
 from pathwalker_cli.model.numbers import Number
-from pathwalker_cli.results.run_folder import load_run
+from pathwalker_cli.results import run_folder
+from pathwalker_cli.results.run_folder import load_run, write_run
 from pathwalker_cli.stride import measures
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measures_in, metrics_of
+from pathwalker_cli.stride.series import gait_series
 from pathwalker_cli.stride.stride import stride_of
 
 PAGE = Path(__file__).parents[1] / "docs" / "python.md"
@@ -147,6 +155,54 @@ def test_an_element_counts_where_a_config_names_it(monkeypatch: pytest.MonkeyPat
 
     forces = walker.element_forces(np.array([q]), np.array([v]), np.zeros((1, 14)))
     assert forces[0, walker.columns([Brake()])] == pytest.approx([-0.5])
+
+
+def test_a_use_of_the_feet_is_solved_and_its_run_read_without_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known(USES, monkeypatch, "toe_first")
+    with pytest.raises(ConfigError, match="is 'toe_first'; allowed: heel_toe, flat, toe"):
+        load_case("mapd-barefoot", changes=("model.contact=toe_first",))
+    register_use("toe_first", single=("flat", "toe"), landing=("toe", "flat"))
+    case = load_case("mapd-barefoot", changes=("model.contact={right: toe_first, left: heel_toe}",))
+    coarse = {"mesh.intervals": 16, "mesh.refinements": 0, "solver.tolerance": 1e-3}
+    solution = GaitSolver(case.with_values(coarse)).solve()
+    assert solution.converged
+    names = solution.walker.pattern.names
+    assert names[-2:] == ("left_toe_right_toe", "left_toe_right_flat")
+    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    write_run(tmp_path / "run", solution)
+    del USES["toe_first"]
+    run = load_run(tmp_path / "run")
+    assert (run.config.model.contact.right.landing, run.config.model.contact.left) == (
+        ("toe", "flat"), USES["heel_toe"],
+    )  # fmt: skip
+    assert gait_series(run.case.walker(), run.motion).phase == solution.series.phase
+    text = (tmp_path / "run" / "config.resolved.yaml").read_text()
+    assert "toe_first" not in text
+    assert "left: heel_toe" in text
+
+
+@pytest.mark.parametrize(
+    ("single", "landing", "sentence"),
+    [
+        (("flat", "toe"), ("heel", "toe"), "from heel to toe"),
+        (("toe",), ("heel",), "without standing flat"),
+        ((), ("heel",), "without any posture"),
+        (("flat", "toe", "flat"), ("flat",), "comes back"),
+        (("flat", "tip"), ("flat",), "names 'tip'"),
+    ],
+)
+def test_uses_that_no_foot_can_have_are_refused(
+    single: tuple[Any, ...], landing: tuple[Any, ...], sentence: str
+) -> None:
+    with pytest.raises(InputError, match=sentence):
+        register_use("own", single, landing)
+    change = f"model.contact={{single: {list(single)}, landing: {list(landing)}}}"
+    with pytest.raises(ConfigError):
+        load_case("mapd-barefoot", changes=(change,))
+    with pytest.raises(InputError, match="there is a use 'flat' already"):
+        register_use("flat", ("flat",), ("flat",))
 
 
 def test_installed_packages_register_what_they_have(

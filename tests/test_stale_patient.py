@@ -39,6 +39,7 @@ from pathwalker_cli.stride.verify import reintegrate
 from pathwalker_cli.studies import (
     landscape,
     learn,
+    measures,
     neighbours,
     perturbation,
     sensitivity,
@@ -187,7 +188,8 @@ def quick(monkeypatch: pytest.MonkeyPatch, made_solution: Callable[..., GaitSolu
         monkeypatch.setattr(place, "resolver_of", near)
         monkeypatch.setattr(place, "measures", numbers)
     monkeypatch.setattr(sensitivity, "Neighbourhood", Around)
-    monkeypatch.setattr(sensitivity, "all_measures", lambda o: {"cost": 0.01 * kg(o)})
+    for place in (sensitivity, measures):
+        monkeypatch.setattr(place, "all_measures", lambda o: {"cost": 0.01 * kg(o)})
     monkeypatch.setattr(learn, "resolver_of", lambda run: MadeResolver(run.case))
     for place in (learn, fit):
         monkeypatch.setattr(place, "stride_at", lambda o: made_stride(made_solution, o.case))

@@ -12,6 +12,7 @@ from conftest import MadeSolution
 from helpers import stylised_series
 from pathwalker_cli.case import load_case
 from pathwalker_cli.config import load_config, smoke_version
+from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import PatientError
 from pathwalker_cli.gait.solution import LocalOptimum
 from pathwalker_cli.gait.solve import GaitSolver
@@ -20,11 +21,14 @@ from pathwalker_cli.patient import load_patient
 from pathwalker_cli.patient.blocks import RealSpring, SpringSet
 from pathwalker_cli.studies.judge import _nearest, _quadratic_edge, _stops, verdict_of
 from pathwalker_cli.studies.verdict import (
+    LOADED,
     SHARE,
     NumberVerdict,
     SnappedSprings,
+    StifferStops,
     StopVerdict,
     Verdict,
+    stop_warnings,
     verdict_lines,
     verdict_of_metrics,
 )
@@ -124,17 +128,62 @@ def test_stops_that_are_reached_are_named() -> None:
     away = StopVerdict("left", "dorsiflexion", -0.13, -0.01, 0.0)
     line = text(verdict(stops=(stop, away)))["hard stops"]
     assert line == "right dorsiflexion stop (7.4 deg) exceeded by 2.9 deg, 40 % of the stride"
+    assert not list(stop_warnings(verdict(stops=(stop, away))))
+
+
+def test_stops_that_carry_much_are_a_warning() -> None:
+    changes = {"cost": -0.0131, STIFFNESSES[0]: -3.04, "step_length_left": 0.012,
+               "step_length_right": 1e-5}  # fmt: skip
+    stop = StopVerdict("right", "dorsiflexion", -0.13, 0.05, 0.4, 10.0, 0.62, 200.0, changes)
+    light = replace(stop, stop="plantarflexion", carried=LOADED / 2, stiffer={})
+    lines = list(verdict_lines(verdict(springs=(PRESCRIBED,), stops=(stop, light))))
+    told = dict(lines)["hard stops"]
+    assert ", 40 % of the stride, by up to 10.0 N m (62 % of the impulse)" in told
+    carried, moved = (text for label, text in lines if not label)
+    assert carried.startswith("WARNING: hard stops carry much")
+    assert "right dorsiflexion stop 62 %;" in carried
+    assert "plantarflexion" not in carried
+    assert moved.endswith(
+        "to first order: right dorsiflexion stop cost -1.3 %, K_D right -3 N m/rad, "
+        "step length, left +0.012 m"
+    )
+    for twice, end in (
+        (
+            StifferStops(2.0, "converged", changes),
+            "solved again: cost -1.3 %, K_D right -3 N m/rad",
+        ),
+        (StifferStops(2.0, "iteration limit", {}), "these stops: iteration limit"),
+    ):
+        *_, last = stop_warnings(verdict(springs=(PRESCRIBED,), stops=(stop,), stiffer_stops=twice))
+        assert end in last
+
+
+def test_verdicts_of_older_runs_know_nothing_of_stops() -> None:
+    stop = StopVerdict("left", "dorsiflexion", -0.1, 0.1, 0.5)
+    plain = json.loads(json.dumps(verdict(stops=(stop,)).as_dict()))
+    del plain["stiffer_stops"]
+    for key in ("torque", "carried", "stiffness", "stiffer"):
+        del plain["stops"][0][key]
+    found = verdict_of_metrics({"verdict": plain})
+    assert found is not None
+    assert not list(stop_warnings(found))
 
 
 def test_stops_are_measured_on_the_stride() -> None:
     series = stylised_series()
     fixed = series.walker.orthosis
-    assert fixed is not None
     found = {(stop.side, stop.stop): stop for stop in _stops(series)}
     ankle = series.column("ankle_r")
-    expected = fixed[0].dorsiflexion_stop - ankle.min()
+    expected = fixed["right"].dorsiflexion_stop - ankle.min()
     assert found["right", "dorsiflexion"].excess == pytest.approx(expected)
     assert (found["right", "dorsiflexion"].share > 0.0) == (expected > 0.0)
+    for stop in found.values():
+        # beyond the bend of the curve, a stop takes what exceeds the torque of the bent spring
+        if stop.excess > 0.03:
+            assert stop.torque == pytest.approx(stop.stiffness * stop.excess, rel=1e-6)
+        assert (stop.carried > 0.0) == (stop.excess > 0.0)
+        assert stop.carried < 1.0
+    assert max(stop.excess for stop in found.values()) > 0.03
 
 
 def test_other_optima_are_counted_with_their_springs() -> None:
@@ -197,7 +246,7 @@ def test_the_shipped_springs_lie_in_their_range() -> None:
     worn = load_patient("sreenivasa2017-patient").require_orthosis()
     assert worn.springs is not None
     for kind in ("dorsiflexion", "plantarflexion"):
-        low, high = getattr(worn.stiffness_range, kind)
+        low, high = getattr(worn.stiffness_range, kind)["right"]
         assert all(low <= spring.stiffness <= high for spring in getattr(worn.springs, kind))
 
 

@@ -116,11 +116,8 @@ class View:
 
 def drawing(frames: GaitFrames) -> Drawing:
     """Return what is drawn of a stride."""
-    with_orthosis = frames.condition == "orthosis"
-    points = dict(frames.points)
-    if with_orthosis:
-        points |= _spring_ends(frames.points)
-    left, right = (_leg(points, side, with_orthosis) for side in ("left", "right"))
+    points = {**frames.points, **_spring_ends(frames.points, frames.braced)}
+    left, right = (_leg(points, side, side in frames.braced) for side in ("left", "right"))
     behind, dots, more = _recorded(frames)
     points |= more
     return Drawing(
@@ -266,12 +263,12 @@ def _zigzag() -> np.ndarray:
     return np.concatenate([[[0.0, 0.0], [0.1, 0.0]], coils, [[0.9, 0.0], [1.0, 0.0]]])
 
 
-def _spring_ends(points: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _spring_ends(points: Mapping[str, np.ndarray], sides: Sequence[Side]) -> dict[str, np.ndarray]:
     """Return where the springs hang on the shells, behind the ankles [m], shape (n, 2) each."""
     ends = {}
     top, foot = np.array([[_SHELL[1], -_SHELL[2]]]), np.array([[_SOLE[0], _SOLE[3]]])
     places = (("top", top, "knee", "ankle"), ("foot", foot, "heel", "toe"))
-    for s in SUFFIX.values():
+    for s in (SUFFIX[side] for side in sides):
         for name, corner, start, end in places:
             pairs = zip(points[f"{start}_{s}"], points[f"{end}_{s}"], strict=True)
             ends[f"spring_{name}_{s}"] = np.array([_placed(corner, a, b)[0] for a, b in pairs])

@@ -264,7 +264,7 @@ def _legend(figure: Figure, drawings: Sequence[Drawing], width: float, height: f
         Patch(facecolor=FORCE_COLOUR, edgecolor=FORCE_COLOUR, label="ground force, right"),
         Patch(facecolor="#ffffff", edgecolor=FORCE_COLOUR, label="left"),
     ]
-    if any(each.frames.condition == "orthosis" for each in drawings):
+    if any(each.frames.braced for each in drawings):
         shell = (SHELL_COLOUR, 0.45)
         handles.append(Patch(facecolor=shell, edgecolor=SPRING_COLOUR, label="orthosis"))
     if any(each.frames.recorded for each in drawings):

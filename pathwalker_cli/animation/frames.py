@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.animation.recorded import RecordedFrames, body_paths, recorded_frames
-from pathwalker_cli.conventions import SIDES, Condition, Side
+from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.evaluation.run import run_names, run_notes, stride_of_run
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import centre_of_pressure, stride_of, switching_times
@@ -30,7 +30,7 @@ class GaitFrames:
     Args:
         name: What to call it, e.g. the folder of the run.
         patient: Who walks.
-        condition: "barefoot" or "orthosis".
+        braced: Sides that wear an orthosis.
         problem: The problem that the stride solves.
         duration: Time of the stride [s].
         distance: Distance of the stride [m].
@@ -46,7 +46,7 @@ class GaitFrames:
 
     name: str
     patient: str
-    condition: Condition
+    braced: tuple[Side, ...]
     problem: str
     duration: float
     distance: float
@@ -131,7 +131,7 @@ def gait_frames(
     return GaitFrames(
         name=name,
         patient=series.walker.patient.id,
-        condition=series.walker.condition,
+        braced=tuple(series.walker.device.elements),
         problem=problem,
         duration=series.duration,
         distance=series.distance,

@@ -100,7 +100,7 @@ def walkers_content(
         "shadow_name": shadow_name,
         "view": view,
         "panels": [_panel(each) for each in drawings],
-        "with_orthosis": any(each.frames.condition == "orthosis" for each in drawings),
+        "with_orthosis": any(each.frames.braced for each in drawings),
     }
 
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from pathwalker_cli.animation.drawing import Shape
 from pathwalker_cli.animation.frames import GaitFrames
-from pathwalker_cli.conventions import Side
+from pathwalker_cli.conventions import Side, worn_words
 from pathwalker_cli.stride.figures.style import BODY_COLOUR, FORCE_COLOUR, LINE_COLOUR
 
 ACTIVATION_COLOURS: Final = (
@@ -95,8 +95,7 @@ def arrow_look(side: Side) -> Look:
 
 def who(frames: GaitFrames) -> str:
     """Return who walks, and with what."""
-    condition = "with orthoses" if frames.condition == "orthosis" else "barefoot"
-    return f"{frames.patient}, {condition} ({frames.problem})"
+    return f"{frames.patient}, {worn_words(frames.braced)} ({frames.problem})"
 
 
 def subtitle(frames: GaitFrames) -> str:

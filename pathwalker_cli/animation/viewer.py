@@ -87,7 +87,7 @@ def _parts(walker: Walker) -> Iterator[_Part]:
     """Yield name, joint, shape, place on the joint and colour of everything that is drawn."""
     points = body_points(walker, np.zeros(len(COORDINATES)))
     for side in SIDES:
-        yield from _leg(points, side, walker.condition == "orthosis")
+        yield from _leg(points, side, side in walker.device.elements)
     dark = _grey(_SHADES["right"])
     hips = [np.array([0.0, y, 0.0]) for y in _ACROSS.values()]
     above = _between(points, "hip_r", "lumbar")

@@ -11,12 +11,14 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, GRAVITY, SIDES
+from pathwalker_cli.conventions import COORDINATES, GRAVITY, SIDES, to_degrees
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.gait.bounds import Range
+from pathwalker_cli.gait.bounds import Range, real_springs
 from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.model.elements.orthosis import stops_of
 from pathwalker_cli.patient import OrthosisData, Patient
 from pathwalker_cli.patient.proportions import SOURCE, default_length
+from pathwalker_cli.studies.verdict import LOADED
 
 _BODY_MASS_INDEX: Final = (11.0, 40.0)
 """[kg/m^2] Wider than three standard deviations at any age in de Onis et al. (2007), Development of
@@ -64,7 +66,8 @@ def odd_orthosis(orthosis: OrthosisData, prefix: str = "") -> Iterator[str]:
     if orthosis.springs is None:
         return
     for kind in ("dorsiflexion", "plantarflexion"):
-        low, high = getattr(orthosis.stiffness_range, kind)
+        pairs = getattr(orthosis.stiffness_range, kind).given.values()
+        low, high = min(pair[0] for pair in pairs), max(pair[1] for pair in pairs)
         for spring in getattr(orthosis.springs, kind):
             if not low <= spring.stiffness <= high:
                 yield (
@@ -102,6 +105,7 @@ def oddities(solver: GaitSolver) -> Iterator[str]:
     """Yield sentences about what is allowed and probably not meant."""
     yield from _odd_speeds(solver)
     yield from _partly_real_springs(solver)
+    yield from _loaded_stops(solver)
     yield from _start_numbers(solver)
     yield from _start_angles(solver)
     yield from _comfort(solver)
@@ -185,9 +189,8 @@ def _spring_ranges(solver: GaitSolver) -> Iterator[tuple[str, Range, Range]]:
     for unknown in solver.walker.unknowns:
         kind = unknown.numbers[0].name
         if kind in solver.walker.device.identified:
-            real = solver.walker.patient.require_orthosis().stiffness_range
             pair = solver.bounds.ranges[unknown.name]
-            yield unknown.name, pair, getattr(real, kind.removesuffix("_stiffness"))
+            yield unknown.name, pair, real_springs(solver.walker.patient, unknown)
 
 
 def _springs(solver: GaitSolver) -> Iterator[ConfigError]:
@@ -210,6 +213,36 @@ def _partly_real_springs(solver: GaitSolver) -> Iterator[str]:
                 f"{solver.bounds.keys[name]} lets {name} reach [{low:g}, {high:g}] N m/rad; real "
                 f"springs end at [{least:g}, {most:g}]"
             )
+
+
+def _loaded_stops(solver: GaitSolver) -> Iterator[str]:
+    """Yield a sentence where stops would carry much, were the ankles bent as far as barefoot."""
+    walker, ranges = solver.walker, solver.bounds.ranges
+    recorded = walker.patient.recorded.get("barefoot")
+    chosen = {address: ranges[u.name] for u in walker.unknowns for address in u.addresses}
+    loaded = []
+    for side, element in walker.device.elements.items():
+        (ankle,) = element.coordinates
+        if recorded is None or ankle not in recorded.joint_ranges:
+            continue
+        ends = zip(*(chosen.get(n.address, (walker.values[n.address],) * 2)
+                     for n in element.numbers[:2]), strict=True)  # fmt: skip
+        each = (stops_of(element.fixed(walker.values), *springs) for springs in ends)
+        for pair, angle in zip(zip(*each, strict=True), recorded.joint_ranges[ankle], strict=True):
+            beyond = pair[0].beyond(angle)
+            torques = [stop.stiffness * beyond for stop in pair]
+            shares = [t / (t + stop.spring) for t, stop in zip(torques, pair, strict=True)]
+            if beyond > 0.0 and min(shares) >= LOADED:
+                loaded.append(
+                    f"{side} {pair[0].name} stop passed by {float(to_degrees(beyond)):.1f} deg, "
+                    f"where it would carry {100 * min(shares):.0f} to {100 * max(shares):.0f} %"
+                )
+    if loaded:
+        yield (
+            "as far as the ankles were bent barefoot, hard stops would carry much of the "
+            f"orthosis' torque: {'; '.join(loaded)}; their stiffness (orthosis.stop_stiffness) "
+            "then decides as that of the springs: measure it"
+        )
 
 
 def _start_numbers(solver: GaitSolver) -> Iterator[str]:

@@ -17,7 +17,7 @@ from pathwalker_cli.results.text import notes_together, orthosis_rows
 def walker_rows(walker: Walker) -> list[Row]:
     """Return who walks, and what is worn."""
     rows = patient_rows(walker.patient)
-    if walker.orthosis is not None:
+    if walker.device.worn:
         rows += orthosis_rows(walker.patient.require_orthosis())
     return rows
 

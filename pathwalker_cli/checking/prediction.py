@@ -161,7 +161,7 @@ def _content(solver: GaitSolver) -> tuple[dict[str, Any], Seconds]:
         "problem": config.problem,
         "condition": walker.condition,
         "patient": patient_content(patient),
-        "orthosis": orthosis_content(patient) if walker.orthosis is not None else None,
+        "orthosis": orthosis_content(patient) if walker.device.worn else None,
         "phases": [phase.name for phase in solver.gait.phases],
         "start": solver.stride.name,
         "starts": config.starts,

@@ -3,24 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from typing import Annotated, Any, Final, Literal
+from dataclasses import asdict
+from typing import Annotated, Any, Final, Literal, get_args
 
-from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PlainSerializer,
+    field_validator,
+    model_validator,
+)
 
 from pathwalker_cli.config.learnt import Learnt
 from pathwalker_cli.conventions import ANGLES, STIFFNESSES, Condition
 from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.gait.costs import ELSEWHERE, GOALS, Costs
 from pathwalker_cli.installed import load_installed
-from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
+from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, Words, YamlModel, invalid
 from pathwalker_cli.model.choices import FRICTION
 from pathwalker_cli.model.contact import (
     HEEL_TOE,
     PHASE_NAMES,
+    SHIPPED_USES,
     SOLES,
+    USES,
     Contact,
     ContactPattern,
     Feet,
+    Posture,
     Use,
     contact_pattern,
 )
@@ -82,6 +93,46 @@ RangeByAngle = Annotated[dict[str, Range], _keys_of(ANGLES)]
 TrialName = Annotated[str, BeforeValidator(lambda x: str(x) if type(x) is int else x)]
 
 
+def _use(value: Any) -> Any:
+    """Return how a foot is used from its name, or from what is on the ground in both supports."""
+    if isinstance(value, str):
+        if value not in USES:
+            load_installed()
+        if value not in USES:
+            mend = did_you_mean(value, USES) or "import what registers it first"
+            raise invalid(f"is '{value}'", allowed=", ".join(USES), mend=mend)
+        return USES[value]
+    if not isinstance(value, dict):
+        return value
+    if set(value) != {"single", "landing"}:
+        raise invalid("is no use of a foot", allowed=f"{', '.join(USES)}, or {_POSTURES}")
+    supports = [value[name] for name in ("single", "landing")]
+    for support in supports:
+        if not isinstance(support, list | tuple) or not set(support) <= set(get_args(Posture)):
+            raise invalid(f"has {support!r} in a support", allowed=_POSTURES)
+    use = Use(*map(tuple, supports))
+    if use.fault:
+        raise invalid(use.fault, allowed=_POSTURES)
+    return use
+
+
+def _plain_use(use: Use) -> Any:
+    """Return a use by the name that comes with this package, else in full: to be read anywhere."""
+    return use.name or asdict(use)
+
+
+_POSTURES: Final = (
+    "{single: [...], landing: [...]} of heel, flat and toe, "
+    "e.g. {single: [flat, toe], landing: [toe, flat]}"
+)
+FootUse = Annotated[
+    Use,
+    BeforeValidator(_use),
+    PlainSerializer(_plain_use),
+    Words("text or block of single, landing", ", ".join(f"`{name}`" for name in SHIPPED_USES)),
+]
+
+
 class ModelConfig(YamlModel):
     """Which model is built."""
 
@@ -90,7 +141,7 @@ class ModelConfig(YamlModel):
     tissue: bool = False
     elements: Annotated[tuple[str, ...], AS_TUPLE] = ()
     feet: Feet = "points"
-    contact: Sides[Use] = Sides[Use](right="heel_toe", left="heel_toe")
+    contact: Sides[FootUse] = Sides[FootUse](right=HEEL_TOE[0], left=HEEL_TOE[1])
 
     @property
     def uses(self) -> Contact:

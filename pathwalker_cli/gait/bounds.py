@@ -244,12 +244,41 @@ def _check_range(unknown: Unknown, pair: Range) -> None:
 
 def _spring_range(walker: Walker, config: BoundsConfig, unknown: Unknown) -> tuple[Range, str, str]:
     """Return range, reason and key of a spring that the config does not free by its address."""
-    real = walker.patient.require_orthosis().stiffness_range
     kind = unknown.numbers[0].name
     given = config.stiffness.get(unknown.name) or getattr(config, kind)
-    key = f"stiffness.{unknown.name}" if unknown.name in config.stiffness else kind
-    pair = given or getattr(real, kind.removesuffix("_stiffness"))
-    return pair, "from the config" if given else f"real springs: {real.source}", f"bounds.{key}"
+    own = f"stiffness.{unknown.name}"
+    key = f"bounds.{own if unknown.name in config.stiffness else kind}"
+    if given:
+        return given, "from the config", key
+    source = walker.patient.require_orthosis().stiffness_range.source
+    return real_springs(walker.patient, unknown), f"real springs: {source}", key
+
+
+def real_springs(patient: Patient, unknown: Unknown) -> Range:
+    """Return the stiffnesses of real springs for an unknown, on all its sides [N m/rad]."""
+    given = patient.require_orthosis().stiffness_range
+    pairs = [getattr(given, n.name.removesuffix("_stiffness"))[n.side] for n in unknown.numbers]
+    return max(low for low, _ in pairs), min(high for _, high in pairs)
+
+
+def require_worn(walker: Walker, config: StudyConfig) -> None:
+    """Refuse a config that names springs of a side that wears no orthosis, beside one that does.
+
+    Raises:
+        ConfigError: If so.
+    """
+    worn = tuple(walker.device.elements)
+    for where, named in (("bounds", config.bounds.stiffness), ("start", config.start.stiffness)):
+        for name in named:
+            side = name.rpartition("_")[2]
+            if worn and side not in worn:
+                raise ConfigError(
+                    f"names a spring of the {side} side, on which {walker.patient.id} wears no "
+                    "orthosis",
+                    where=f"{where}.stiffness.{name}",
+                    allowed=f"springs of the {' and '.join(worn)}",
+                    mend="leave it out, or correct orthosis.sides of the patient",
+                )
 
 
 def _check_orthosis(walker: Walker, ranges: Mapping[str, Range], keys: Mapping[str, str]) -> None:

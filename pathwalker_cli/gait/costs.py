@@ -43,7 +43,7 @@ class Instant:
         reference: Coordinates that are followed, 10 entries [m, rad].
         heights: Heights of the places in the air, in the order of the walker's pattern [m].
         speeds: Their forward velocities [m/s].
-        worn: Torques of the orthoses right, left [N m]; none barefoot.
+        worn: Torques of the orthoses right, left [N m]; 0 where none is worn.
         power: Power of the activations in the effort.
         data: Numbers of the term, see `CostTerm.size`.
     """
@@ -291,7 +291,7 @@ def _stumbling(point: Instant) -> tuple[Any, ...]:
 
 def _cuff_load(point: Instant) -> tuple[Any, ...]:
     weight, *heights = point.data
-    forces = (torque / (h * weight) for torque, h in zip(point.worn, heights, strict=False))
+    forces = (torque / (h * weight) for torque, h in zip(point.worn, heights, strict=True))
     return (sum((force**2 for force in forces), 0.0 * point.q[0]),)
 
 

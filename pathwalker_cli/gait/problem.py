@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import COORDINATES, GENERATORS, SUFFIX, Side
+from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX, Side
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.boundary import gait_boundary
 from pathwalker_cli.gait.costs import SHIPPED, Costs, Instant, Weights
@@ -66,8 +66,13 @@ class _Constants:
         self.friction, self.weight = ca.SX.sym("friction"), ca.SX.sym("weight")
         self.weights = ca.SX.sym("weights", len(costs.weighed))
         self.cost_numbers = ca.SX.sym("cost_numbers", costs.size)
-        self.moving = tuple(u for u in walker.unknowns if walker.moves_bodies(u))
-        self.slopes = [ca.SX.sym(f"{u.name}_slope", self.theta.numel()) for u in self.moving]
+        self.moving = tuple(
+            number
+            for unknown in walker.unknowns
+            for number in unknown.numbers
+            if number in walker.parts.body_numbers
+        )
+        self.slopes = [ca.SX.sym(f"{n.full_name}_slope", self.theta.numel()) for n in self.moving]
 
     @property
     def vector(self) -> ca.SX:
@@ -189,10 +194,10 @@ class GaitProblem:
 
     @cached_property
     def _theta(self) -> ca.SX:
-        """Numbers of the rigid bodies, shifted by the unknowns that they depend on."""
+        """Numbers of the rigid bodies, shifted by the free numbers that they depend on."""
         theta, constants = self.constants.theta, self.constants
-        for unknown, slope in zip(constants.moving, constants.slopes, strict=True):
-            address = unknown.addresses[0]
+        for number, slope in zip(constants.moving, constants.slopes, strict=True):
+            address = number.address
             theta = theta + slope * (self._free[address] - constants.numbers[address])
         return theta
 
@@ -279,7 +284,10 @@ class GaitProblem:
         columns = (self.q, self.v, a, force, rate, excitation_from_rate(rate, a), vdot, reserve)
         air = self.pattern.in_the_air(contact)
         heights, speeds = position[[2 * i + 1 for i in air]], velocity[[2 * i for i in air]]
-        worn = self._torques[0][self.walker.columns(self.walker.device.forces)]
+        worn = ca.SX.zeros(len(SIDES))
+        for side, element in self.walker.device.elements.items():
+            (column,) = self.walker.columns([element])
+            worn[SIDES.index(side)] = self._torques[0][column]
         known = *columns, self.reference, heights, speeds, worn
         point = Instant(contact, *(ca.vertsplit(x) if x.numel() else [] for x in known))
         numbers = ca.vertsplit(self.constants.cost_numbers)

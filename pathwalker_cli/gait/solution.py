@@ -105,7 +105,8 @@ class LocalOptimum:
         description: The start in words.
         status: "converged" or the reason why not.
         walking_speed: Walking speed [m/s].
-        stiffness: K_D right, left, K_P right, left [N m/rad]; empty when barefoot.
+        stiffness: K_D right, left, K_P right, left [N m/rad], None where no orthosis is worn; empty
+            when barefoot.
         numbers: Value of every number that was free to choose, by name [SI].
         seconds: Wall seconds.
     """
@@ -115,7 +116,7 @@ class LocalOptimum:
     status: str
     cost: float
     walking_speed: float
-    stiffness: tuple[float, ...]
+    stiffness: tuple[float | None, ...]
     iterations: int
     seconds: float
     numbers: dict[str, float] = field(default_factory=dict)

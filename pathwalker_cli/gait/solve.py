@@ -19,6 +19,7 @@ from pathwalker_cli.gait.bounds import (
     gait_bounds,
     helped_bounds,
     recorded_durations,
+    require_worn,
     tracking_bounds,
 )
 from pathwalker_cli.gait.cost_terms import cost_terms, with_goal_costs
@@ -82,6 +83,7 @@ class GaitSolver:
         """Build walker, bounds and the blocks of the problem."""
         began = time.perf_counter()
         self.walker = self.case.walker(self.config.model.backend)
+        require_worn(self.walker, self.config)
         self.bounds = gait_bounds(self.walker, self.config.bounds, self.config.free)
         self.gait = GaitProblem(self.walker, self._form(), self.config.cost.wanted)
         if self.config.start.gait == "recorded":

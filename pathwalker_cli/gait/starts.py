@@ -108,7 +108,7 @@ def _solved(number: int, case: Case) -> _Outcome:
         status=solution.status,
         cost=solution.cost,
         walking_speed=walked_distance(last) / last.duration,
-        stiffness=tuple(solution.walker.stiffness.tolist()),
+        stiffness=tuple(None if np.isnan(k) else float(k) for k in solution.walker.stiffness),
         iterations=solution.iterations,
         seconds=float(sum(solution.seconds.values())),
         numbers=solver.by_name(last.parameters),

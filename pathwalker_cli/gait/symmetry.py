@@ -30,7 +30,7 @@ def asymmetries(walker: Walker) -> list[str]:
         "contact points": np.allclose(right, left) and round_alike,
         "contacts": len(set(walker.parts.contact)) == 1,
         "masses or lengths": np.allclose(bias, swapped[order], rtol=1e-9, atol=1e-9),
-        "orthoses": walker.orthosis is None or walker.orthosis[0] == walker.orthosis[1],
+        "orthoses": walker.orthosis.get("right") == walker.orthosis.get("left"),
     }
     return [name for name, same in alike.items() if not same]
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import model_validator
 from scipy.interpolate import PchipInterpolator
 
-from pathwalker_cli.conventions import COORDINATES, Condition
+from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Condition
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
@@ -98,7 +98,13 @@ def marker_points(
     """
     lengths = {segment.name: segment.length for segment in segments(patient, "barefoot")}
     scale = patient.height / marker_set.reference_height
-    entries = [*marker_set.both, *getattr(marker_set, condition)]
+    shod = patient.braced(condition) or SIDES
+    bare = tuple(f"_{SUFFIX[side]}" for side in SIDES if side not in shod)
+    entries = [
+        *marker_set.both,
+        *(entry for entry in getattr(marker_set, condition) if not entry.link.endswith(bare)),
+        *(entry for entry in marker_set.barefoot if entry.link.endswith(bare)),
+    ]
     if 2 * len(entries) < len(COORDINATES):
         raise ConfigError(
             f"has {len(entries)} points for {condition}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import NoneType, UnionType
 from typing import Annotated, Any, Final, Generic, Literal, TypeVar, Union, get_args, get_origin
@@ -15,6 +16,15 @@ from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Words:
+    """Annotation: type and allowed values in words, where the type does not tell them."""
+
+    kind: str
+    allowed: str
+
 
 _WRITTEN: Final = re.compile(r"([-+]?\d+(?:\.\d*)?) *(deg|N m/deg)")
 _PER_DEGREE: Final = {
@@ -27,7 +37,11 @@ _PER_DEGREE: Final = {
 _LARGEST: Final = sys.float_info.max
 
 
-AS_TUPLE: Final = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) else value)
+def _as_tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+AS_TUPLE: Final = BeforeValidator(_as_tuple)
 """Annotation of a tuple below `Sides`, where strict validation no longer sees YAML's lists."""
 
 
@@ -118,21 +132,79 @@ class Sides(YamlModel, Generic[T]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel by the type of the values: the class of a pair has no name of its own."""
-        return _pair, (side_type(type(self)), self.right, self.left)
+        kind = type(self).__pydantic_generic_metadata__["origin"]
+        return _pair, (kind, side_type(type(self)), self.right, self.left)
+
+    @property
+    def given(self) -> dict[str, T]:
+        """The values by side, right before left."""
+        both = {"right": self.right, "left": self.left}
+        return {side: value for side, value in both.items() if value is not None}
 
     def __str__(self) -> str:
-        """Return the one value of both sides, or both as a file gives them."""
-        both = str(self.right), str(self.left)
-        return both[0] if both[0] == both[1] else f"{{right: {both[0]}, left: {both[1]}}}"
+        """Return the one value of all sides, or each as a file gives it."""
+        texts = {side: str(value) for side, value in self.given.items()}
+        if len(set(texts.values())) == 1:
+            return next(iter(texts.values()))
+        return f"{{{', '.join(f'{side}: {text}' for side, text in texts.items())}}}"
 
     def __getitem__(self, side: str) -> T:
         """Return the value of "right" or "left"."""
         return {"right": self.right, "left": self.left}[side]
 
 
-def _pair(of: Any, right: Any, left: Any) -> Sides[Any]:
+class Worn(Sides[T], Generic[T]):
+    """One value per side that wears something, see `on_sides`; None on the other one."""
+
+    right: T | None = None  # type: ignore[assignment]
+    left: T | None = None  # type: ignore[assignment]
+
+
+def _pair(kind: Any, of: Any, right: Any, left: Any) -> Sides[Any]:
     """Return a pair of checked values of a type."""
-    return Sides[of].model_construct(right=right, left=left)
+    pair: Sides[Any] = kind[of].model_construct(right=right, left=left)
+    return pair
+
+
+def on_sides(
+    model: type[BaseModel], content: Mapping[str, Any], sides: Sequence[str], above: str = ""
+) -> dict[str, Any]:
+    """Return the content of a block in which every `Worn` has a value for just these sides.
+
+    A single value counts for all of them.
+
+    Raises:
+        PydanticCustomError: If there is one for another side, or none for one of these.
+    """
+    result = dict(content)
+    for name, field in model.model_fields.items():
+        value = content.get(name)
+        for inner in _models_in(field):
+            if issubclass(inner, Worn) and value is not None:
+                result[name] = _of_sides(value, sides, above + name)
+            elif isinstance(value, Mapping):
+                result[name] = on_sides(inner, value, sides, f"{above}{name}.")
+    return result
+
+
+def _of_sides(value: Any, sides: Sequence[str], key: str) -> Any:
+    """Return what is given for some sides, by side."""
+    if isinstance(value, Worn):
+        return value
+    if not isinstance(value, Mapping) or not {"right", "left"} & value.keys():
+        return dict.fromkeys(sides, value)
+    only = " and ".join(sides)
+    for side in ("right", "left"):
+        given = value.get(side) is not None
+        if given and side not in sides:
+            raise invalid(
+                f"has {key}.{side}, but is worn on the {only} only",
+                allowed=f"{key} of the {only}",
+                mend=f"leave it out, or add {side} to sides",
+            )
+        if side in sides and not given:
+            raise invalid(f"has {key} without {side}", allowed=f"one value, or one for {only}")
+    return value
 
 
 _KINDS: Final[dict[Any, str]] = {
@@ -147,6 +219,8 @@ _KINDS: Final[dict[Any, str]] = {
 def described(annotation: Any, metadata: list[Any]) -> tuple[str, str]:
     """Return the type and the allowed values of an annotation in words."""
     for entry in metadata:
+        if isinstance(entry, Words):
+            return entry.kind, entry.allowed
         if isinstance(entry, Quantity):
             unit = f", {entry.unit}" if entry.unit else ""
             return f"number{unit}", f"{entry.lower:g} to {entry.upper:g}"
@@ -212,7 +286,7 @@ def field_at(model: type[BaseModel], place: str) -> FieldInfo:
         return field
     inner = _models_in(field)[0]
     if issubclass(inner, Sides):
-        inner = inner.model_fields["right"].annotation
+        inner = side_type(inner)
     return field_at(inner, rest)
 
 

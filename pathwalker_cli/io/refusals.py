@@ -96,7 +96,7 @@ def _alternatives(
     number: all that is allowed is told.
     """
     clauses = [_clauses(problem, path, model_class) for problem in problems]
-    if len(clauses) == 1:
+    if len(set(clauses)) == 1:  # one value may count for both sides
         return clauses[0]
     value = problems[0]["input"]
     number = isinstance(value, int | float) and not isinstance(value, bool)

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from pathwalker_cli.conventions import SIDES, SUFFIX, Condition
-from pathwalker_cli.model.devices import DEVICES
+from pathwalker_cli.model.devices import device_on
 
 if TYPE_CHECKING:
     from pathwalker_cli.patient import Patient
@@ -132,8 +132,8 @@ def segments(
     """
     mass = (values or {}).get
     added = {
-        segment: mass(number.address, patient.number(number.address))
-        for segment, number in DEVICES[condition].added_mass.items()
+        link: mass(number.address, patient.number(number.address))
+        for link, number in device_on(patient.braced(condition)).added_mass.items()
     }
     return (
         _segment(patient, "pelvis", "", 0.0),
@@ -153,7 +153,15 @@ def _leg(patient: Patient, side: str, added: Mapping[str, float]) -> tuple[Segme
         ("foot", f"shank_{suffix}", "ankle", patient.length("shank", side)),
     )
     return tuple(
-        _segment(patient, name, parent, -drop, f"{joint}_{suffix}", side, added.get(name, 0.0))
+        _segment(
+            patient,
+            name,
+            parent,
+            -drop,
+            f"{joint}_{suffix}",
+            side,
+            added.get(f"{name}_{suffix}", 0.0),
+        )
         for name, parent, joint, drop in chain
     )
 

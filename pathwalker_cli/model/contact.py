@@ -6,11 +6,11 @@ one left step.  That of Sreenivasa et al. (2017), section 2.3, is "heel_toe" on 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from itertools import product
-from typing import TYPE_CHECKING, Any, Final, Literal
+from itertools import pairwise, product
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 
@@ -35,14 +35,61 @@ slipping, one convex sole that rolls from heel to toe, or the same sole giving w
 SOLES: Final[tuple[Feet, ...]] = ("sole", "compliant")
 """Feet of one convex body."""
 
-Use = Literal["heel_toe", "flat", "toe"]
-"""How a foot with heel and toe is used: lands on the heel and then the toe, lands flat, or walks on
-the toe alone."""
+Posture = Literal["heel", "flat", "toe"]
+"""What of a foot with heel and toe stands on the ground."""
+
+
+@dataclass(frozen=True)
+class Use:
+    """How a foot with heel and toe is used.
+
+    Args:
+        single: What of it is on the ground while the other foot swings, in order.
+        landing: What of it is on the ground after it has landed, until the other one leaves it.
+    """
+
+    single: tuple[Posture, ...]
+    landing: tuple[Posture, ...]
+
+    @property
+    def name(self) -> str:
+        """Its name if it comes with this package, else ""."""
+        return next((name for name in SHIPPED_USES if USES[name] == self), "")
+
+    def __str__(self) -> str:
+        """Return it as a config gives it."""
+        parts = (f"{key}: [{', '.join(value)}]" for key, value in vars(self).items())
+        return self.name or f"{{{', '.join(parts)}}}"
+
+    @property
+    def fault(self) -> str:
+        """What no foot can do of this, "" if there is nothing."""
+        for support in (self.single, self.landing):
+            if not support:
+                return "leaves a support without any posture"
+            if len(set(support)) < len(support):
+                return "comes back to a posture within one support"
+        way = (*self.landing, *self.single)
+        if any({here, there} == {"heel", "toe"} for here, there in pairwise(way)):
+            return "passes from heel to toe, or back, without standing flat"
+        return ""
+
+
+USES: Final[dict[str, Use]] = {
+    "heel_toe": Use(("flat", "toe"), ("heel", "flat")),
+    "flat": Use(("flat", "toe"), ("flat",)),
+    "toe": Use(("toe",), ("toe",)),
+}
+"""Uses by the name that configs call them: lands on the heel and then the toe, lands flat, walks on
+the toe alone, and what was registered, see `extensions`."""
+
+SHIPPED_USES: Final = tuple(USES)
+"""Names of those that come with this package."""
 
 Contact = tuple[Use, Use]
 """Use of the right and the left foot."""
 
-HEEL_TOE: Final[Contact] = ("heel_toe", "heel_toe")
+HEEL_TOE: Final[Contact] = (USES["heel_toe"], USES["heel_toe"])
 """That of the article."""
 
 
@@ -154,8 +201,12 @@ class ContactPhase:
         return tuple(side for side in SIDES if side in standing)
 
     def touched_down(self, following: ContactPhase) -> tuple[ContactForce, ...]:
-        """Return the directions in which new places are stopped when the next phase begins."""
-        return tuple(force for force in following.forces if force.point not in self.points)
+        """Return the directions in which new places are stopped when the next phase begins.
+
+        Of a rigid foot that stands already, that is the vertical one alone.
+        """
+        new = (force for force in following.forces if force.point not in self.points)
+        return tuple(f for f in new if f.bears or f.point.side not in self.feet)
 
     def lifted_off(self, following: ContactPhase) -> tuple[ContactForce, ...]:
         """Return the forces that have faded to zero when the next phase begins.
@@ -234,8 +285,8 @@ class ContactPattern:
     def durations(self, parts: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return the durations of the phases from those of `PHASES` [s].
 
-        A single or double support that has one phase takes the time of the two that it has there,
-        a step that has one phase all of it.
+        A single or double support of another number of phases shares out the time of the two that
+        it has there evenly, a step that has one phase takes all of it.
         """
         result: list[float] = []
         for step, quarters in zip(self.steps, np.split(np.asarray(parts, float), 2), strict=True):
@@ -244,7 +295,8 @@ class ContactPattern:
                 continue
             for support, pair in zip((1, 2), np.split(quarters, 2), strict=True):
                 count = sum(len(phase.feet) == support for phase in step)
-                result += pair.tolist() if count == len(pair) else [float(pair.sum())]
+                even = [float(pair.sum()) / count] * count
+                result += pair.tolist() if count == len(pair) else even
         return np.array(result)
 
 
@@ -252,18 +304,6 @@ POINTS: Final = tuple(ContactPoint(place, side) for side in SIDES for place in (
 """Heel and toe of both feet, the ends of their soles."""
 
 _SOLES: Final = tuple(ContactPoint("sole", side) for side in SIDES)
-
-_SINGLE: Final[Mapping[Use, tuple[str, ...]]] = {
-    "heel_toe": ("flat", "toe"),
-    "flat": ("flat", "toe"),
-    "toe": ("toe",),
-}
-_LANDING: Final[Mapping[Use, tuple[str, ...]]] = {
-    "heel_toe": ("heel", "flat"),
-    "flat": ("flat",),
-    "toe": ("toe",),
-}
-"""What of a foot is on the ground, in order: while the other swings, and after it has landed."""
 
 
 def _on(side: Side, posture: str) -> tuple[ContactForce, ...]:
@@ -300,24 +340,30 @@ def contact_pattern(feet: Feet = "points", contact: Contact = HEEL_TOE) -> Conta
         forces = tuple(force for side in SIDES for force in _on(side, "sole"))
         steps = (ContactPhase(f"{side}_step", forces, side, compliant=True) for side in SIDES)
         return ContactPattern(_SOLES, tuple(steps))
-    use = dict(zip(SIDES, contact, strict=True))
-    right = _step("right", _SINGLE[use["right"]], _LANDING[use["left"]])
-    left = _step("left", _SINGLE[use["left"]], _LANDING[use["right"]])
+    on_right, on_left = contact
+    right = _step("right", on_right.single, on_left.landing)
+    left = _step("left", on_left.single, on_right.landing)
     return ContactPattern(POINTS, (*right, *left))
 
 
 PHASES: Final = contact_pattern().phases
 """The eight phases of a stride from heel to toe."""
 
-PATTERNS: Final = (
-    *(contact_pattern("points", use) for use in product(_SINGLE, repeat=2)),
-    *(contact_pattern(feet) for feet in SOLES),
-)
-"""All patterns that there are."""
-
-_NAMED: Final = {phase.name: phase for pattern in PATTERNS for phase in pattern.phases}
+_NAMED: Final = {
+    phase.name: phase
+    for phase in (
+        *PHASES,
+        *(
+            phase
+            for last, landing in product(get_args(Posture), repeat=2)
+            for side in SIDES
+            for phase in _step(side, (last,), (landing,))
+        ),
+        *(phase for feet in SOLES for phase in contact_pattern(feet).phases),
+    )
+}
 PHASE_NAMES: Final = tuple(_NAMED)
-"""Names of the phases of all patterns."""
+"""Names of the phases of all patterns that feet can walk in."""
 
 
 def phase_named(phase: str | int) -> ContactPhase:

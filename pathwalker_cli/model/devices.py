@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Final
 
 from pathwalker_cli.model.elements import ForceElement
 from pathwalker_cli.model.elements.orthosis import AnkleOrthosis
 from pathwalker_cli.model.numbers import Number
-from pathwalker_cli.model.skeleton import SIDES, Side
+from pathwalker_cli.model.skeleton import SIDES, SUFFIX, Side
 
 
 @dataclass(frozen=True)
 class Device:
-    """What a patient wears on both feet.
+    """What a patient wears on the feet.
 
     Args:
-        elements: Force elements that it adds, one per side.
-        added_mass: What it adds to a segment of each leg [kg], by the segment.
+        elements: Force elements that it adds, one per side that wears it.
+        added_mass: What it adds to a link [kg], by the link.
         identified: Names of the numbers that a prediction with it looks for by itself.
     """
 
@@ -37,17 +38,22 @@ class Device:
         return bool(self.elements)
 
 
-DEVICES: Final[dict[str, Device]] = {
-    "barefoot": Device(),
-    "orthosis": Device(
-        elements={side: AnkleOrthosis(side) for side in SIDES},
+_MASSES: Final = ("shank", "foot")
+"""Segments of a leg that an orthosis makes heavier."""
+
+
+@cache
+def device_on(sides: tuple[Side, ...]) -> Device:
+    """Return an ankle-foot orthosis on each of these sides; nothing on none."""
+    return Device(
+        elements={side: AnkleOrthosis(side) for side in sides},
         added_mass={
-            segment: Number(
-                f"orthosis.mass.{segment}", f"{segment}_mass", f"mass on the {segment}", "kg"
+            f"{segment}_{SUFFIX[side]}": Number(
+                f"orthosis.mass.{segment}.{side}", f"{segment}_mass", f"mass on the {segment}",
+                "kg", side,
             )
-            for segment in ("shank", "foot")
+            for segment in _MASSES
+            for side in sides
         },
-        identified=("dorsiflexion_stiffness", "plantarflexion_stiffness"),
-    ),
-}
-"""Device by condition."""
+        identified=("dorsiflexion_stiffness", "plantarflexion_stiffness") if sides else (),
+    )  # fmt: skip

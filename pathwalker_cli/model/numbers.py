@@ -71,23 +71,29 @@ class Unknown:
 
     Args:
         name: Name of the unknown, e.g. "neutral_angle_right", or "neutral_angle" for both sides.
+        address: The place in the patient's file under which a config frees or holds it.
         label: The name for people, e.g. "K_D right".
         numbers: The numbers that it sets, all in one unit.
         scale: What counts as 1 for the solver [unit].
     """
 
     name: str
+    address: str
     label: str
     numbers: tuple[Number, ...]
     scale: float
 
     @classmethod
-    def of(cls, *numbers: Number) -> Unknown:
-        """Return the unknown that sets one number, or those of both sides alike."""
+    def of(cls, *numbers: Number, address: str = "") -> Unknown:
+        """Return the unknown that sets one number, or those of both sides alike.
+
+        Its address is that of the number if left out, or the place that both sides share.
+        """
         first, alone = numbers[0], len(numbers) == 1
         label = f"{first.label} {first.side}" if alone and first.side else first.label
         name = first.full_name if alone else first.name
-        return cls(name, label, numbers, UNIT_SIZES.get(first.unit, 1.0))
+        address = address or (first.address if alone else first.place)
+        return cls(name, address, label, numbers, UNIT_SIZES.get(first.unit, 1.0))
 
     @property
     def unit(self) -> str:
@@ -103,12 +109,6 @@ class Unknown:
     def addresses(self) -> tuple[str, ...]:
         """Addresses of the numbers."""
         return tuple(number.address for number in self.numbers)
-
-    @property
-    def address(self) -> str:
-        """The place in the patient's file under which a config frees or holds it."""
-        first = self.numbers[0]
-        return first.address if len(self.numbers) == 1 else first.place
 
     def value(self, values: Mapping[str, float]) -> float:
         """Return its value among those of a walker, of several the mean [unit]."""
@@ -132,6 +132,13 @@ def unknowns_at(addresses: Iterable[str], numbers: Sequence[Number]) -> tuple[Un
         matching = [n for n in numbers if address in (n.address, n.place)]
         if not matching:
             known = sorted({n.place for n in numbers})
+            place, _, side = address.rpartition(".")
+            if place in known and side in SIDES:
+                raise ConfigError(
+                    f"names '{address}', but the {side} side has none",
+                    where="free",
+                    allowed=" or ".join(n.address for n in numbers if n.place == place),
+                )
             sides = f"; with .{' or .'.join(SIDES)} behind it for one side of what exists twice"
             raise ConfigError(
                 f"names '{address}', which is no number of this walker",
@@ -139,7 +146,7 @@ def unknowns_at(addresses: Iterable[str], numbers: Sequence[Number]) -> tuple[Un
                 allowed=", ".join(known) + sides,
                 mend=did_you_mean(address, known),
             )
-        unknown = Unknown.of(*matching)
+        unknown = Unknown.of(*matching, address=address)
         if twice := taken.intersection(unknown.addresses):
             raise ConfigError(
                 f"names {min(twice)} twice", where="free",

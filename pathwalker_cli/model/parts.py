@@ -17,11 +17,12 @@ from pathwalker_cli.model.contact import (
     Feet,
     contact_pattern,
 )
-from pathwalker_cli.model.devices import DEVICES, Device
+from pathwalker_cli.model.devices import Device, device_on
 from pathwalker_cli.model.elements import ForceElement, registered_elements
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
 from pathwalker_cli.model.elements.tissue import leg_tissue
 from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at
+from pathwalker_cli.model.skeleton import Side
 
 _MUSCLES: Final = generators()
 _TISSUE: Final = leg_tissue()
@@ -37,6 +38,7 @@ class Parts:
         feet: What the feet touch the ground with.
         contact: How right and left foot are used; a sole needs to know nothing of it.
         further: Names of force elements that were registered, see `extensions`.
+        braced: Sides that wear an orthosis.
     """
 
     condition: Condition = "barefoot"
@@ -44,6 +46,7 @@ class Parts:
     feet: Feet = "points"
     contact: Contact = HEEL_TOE
     further: tuple[str, ...] = ()
+    braced: tuple[Side, ...] = ()
 
     @property
     def pattern(self) -> ContactPattern:
@@ -63,7 +66,7 @@ class Parts:
     @property
     def device(self) -> Device:
         """What the patient walks with."""
-        return DEVICES[self.condition]
+        return device_on(self.braced)
 
     @property
     def muscles(self) -> tuple[MuscleTorqueGenerator, ...]:

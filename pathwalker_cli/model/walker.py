@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import CONDITIONS, SIDES, Condition
+from pathwalker_cli.conventions import CONDITIONS, SIDES, STIFFNESSES, Condition
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.model.backends import rigid_body_functions
 from pathwalker_cli.model.backends.functions import RigidBodyFunctions
@@ -32,7 +32,7 @@ from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator
 from pathwalker_cli.model.elements.orthosis import OrthosisSide
 from pathwalker_cli.model.numbers import Number, Unknown
 from pathwalker_cli.model.parts import Parts
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, Side, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 
@@ -123,17 +123,25 @@ class Walker:
         return np.array([self.values[m.numbers[0].address] for m in self.muscles])
 
     @property
-    def orthosis(self) -> tuple[OrthosisSide, ...] | None:
-        """All but the springs of the orthoses right and left; None when barefoot."""
-        if not self.device.worn:
-            return None
-        return tuple(self.device.elements[side].fixed(self.values) for side in SIDES)
+    def orthosis(self) -> dict[Side, OrthosisSide]:
+        """All but the springs of the orthoses, by the side that wears one."""
+        return {side: each.fixed(self.values) for side, each in self.device.elements.items()}
+
+    @property
+    def springs(self) -> tuple[str, ...]:
+        """Names of the springs that are worn, in the order of `conventions.STIFFNESSES`."""
+        return tuple(n for n in STIFFNESSES if n.rpartition("_")[2] in self.device.elements)
 
     @property
     def stiffness(self) -> np.ndarray:
-        """K_D right, left, K_P right, left [N m/rad], shape (4,); empty when barefoot."""
-        springs = [self.device.elements[s].springs(self.values) for s in SIDES if self.device.worn]
-        return np.array(springs).T.ravel()
+        """K_D right, left, K_P right, left [N m/rad], shape (4,); empty when barefoot.
+
+        NaN where the one side wears an orthosis and the other one none.
+        """
+        if not self.device.worn:
+            return np.zeros(0)
+        springs = {side: each.springs(self.values) for side, each in self.device.elements.items()}
+        return np.array([springs.get(side, (np.nan, np.nan)) for side in SIDES]).T.ravel()
 
     def with_parameters(self, parameters: Sequence[float] | np.ndarray) -> Walker:
         """Return the walker in which the unknowns have these values [SI], in their order."""
@@ -171,17 +179,13 @@ class Walker:
         hip = np.mean([data.oMi[self.model.getJointId(f"hip_{s}")].translation[2] for s in "rl"])
         return float(hip - self.foot_points(zero)[:, 1].mean())
 
-    def moves_bodies(self, unknown: Unknown) -> bool:
-        """Return whether an unknown is a number of the rigid bodies."""
-        return any(number in self.parts.body_numbers for number in unknown.numbers)
-
-    def body_slopes(self, unknown: Unknown) -> np.ndarray:
+    def body_slopes(self, number: Number) -> np.ndarray:
         """Return the derivatives of the rigid bodies' numbers in one of `Parts.body_numbers`, (k,).
 
         They are exact: masses, moments of inertia and radii are linear in it.
         """
-        values = {a: self.values[a] + 1.0 for a in unknown.addresses}
-        return self.with_values(values).rigid_body.parameters - self.rigid_body.parameters
+        moved = self.with_values({number.address: self.values[number.address] + 1.0})
+        return moved.rigid_body.parameters - self.rigid_body.parameters
 
     def state(self, q: Any, v: Any, activation: Any) -> State:
         """Return coordinates, velocities and activations by name; one entry or row for each."""
@@ -238,33 +242,41 @@ class Walker:
             k_p: Plantarflexion stiffness right, left [N m/rad], shape (2,) or one for both.
 
         Returns:
-            Torques right, left [N m], + = plantarflexion, shape (2,); zero when barefoot.
+            Torques right, left [N m], + = plantarflexion, shape (2,); zero where none is worn.
         """
         q, rest = _vector(q, self.skeleton.size, "q"), np.zeros(self.skeleton.size)
-        if not self.device.worn:
-            return np.zeros(2)
         given = {"dorsiflexion_stiffness": k_d, "plantarflexion_stiffness": k_p}
         springs = {
-            number.address: float(np.broadcast_to(given[number.name], 2)[i])
-            for i, element in enumerate(self.device.forces)
+            number.address: float(np.broadcast_to(given[number.name], 2)[SIDES.index(side)])
+            for side, element in self.device.elements.items()
             for number in element.numbers
             if number.name in given
         }
         forces = self.with_values(springs).element_forces(q, rest, np.zeros(len(self.muscles)))
-        return forces[self.columns(self.device.forces)]
+        return self.device_torques(forces)
+
+    def device_torques(self, forces: np.ndarray) -> np.ndarray:
+        """Return what orthoses exert right, left [N m], (..., 2), of the forces of all elements.
+
+        These are of shape (..., k); a side that wears none has zero.
+        """
+        torques = np.zeros((*forces.shape[:-1], len(SIDES)))
+        worn = [SIDES.index(side) for side in self.device.elements]
+        torques[..., worn] = forces[..., self.columns(self.device.forces)]
+        return torques
 
     def joint_torques(self, muscle: Any, orthosis: Any = (0.0, 0.0)) -> np.ndarray:
         """Return generalised forces of the actuators [N m], shape (10,); zero at the root.
 
         Args:
             muscle: Torque of each generator [N m], shape (14,).
-            orthosis: Torque of the orthoses right, left [N m], shape (2,).
+            orthosis: Torque of the orthoses right, left [N m], shape (2,); where none is worn, it
+                does not count.
         """
         forces = np.zeros(sum(len(element.coordinates) for element in self.elements))
         forces[self.columns(self.muscles)] = _vector(muscle, len(self.muscles), "muscle")
-        orthosis = _vector(orthosis, 2, "orthosis")
-        if self.device.worn:
-            forces[self.columns(self.device.forces)] = orthosis
+        worn = [SIDES.index(side) for side in self.device.elements]
+        forces[self.columns(self.device.forces)] = _vector(orthosis, 2, "orthosis")[worn]
         return self.generalised_forces(forces)
 
     def contact_dynamics(
@@ -410,7 +422,7 @@ def build_walker(
         raise InputError(
             f"there is no condition {condition!r}", allowed=" or ".join(map(repr, CONDITIONS))
         )
-    parts = Parts(condition, tissue, feet, contact, tuple(further))
+    parts = Parts(condition, tissue, feet, contact, tuple(further), patient.braced(condition))
     return walker_of(patient, parts, published, backend, free)
 
 
@@ -436,7 +448,7 @@ def walker_of(
         PatientError: If the patient lacks strengths or, for "orthosis", an orthosis.
         ConfigError: If there is no such number.
     """
-    if parts.device.worn:
+    if parts.condition == "orthosis":
         patient.require_orthosis()
     model = pinocchio_model(patient, parts.condition, published)
     values = {n.address: n.value_for(patient) for n in parts.numbers}

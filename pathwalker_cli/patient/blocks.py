@@ -7,12 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Final
+from itertools import product
+from typing import Annotated, Any, Final
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from pathwalker_cli.conventions import ANGLES, GENERATORS, SIDES, SUFFIX
-from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, YamlModel, invalid
+from pathwalker_cli.conventions import ANGLES, GENERATORS, SIDES, SUFFIX, Side
+from pathwalker_cli.io.fields import (
+    AS_TUPLE,
+    Quantity,
+    Sides,
+    Worn,
+    YamlModel,
+    invalid,
+    on_sides,
+)
 
 Length = Annotated[float, Quantity("m", 0.005, 1.0, above="is it in centimetres or millimetres?")]
 Offset = Annotated[
@@ -21,6 +30,10 @@ Offset = Annotated[
 Strength = Annotated[float, Quantity("N m", 0.1, 500.0)]
 Angle = Annotated[float, Quantity("rad", -3.2, 3.2, "is it in degrees?", "is it in degrees?")]
 Stiffness = Annotated[float, Quantity("N m/rad", 1.0, 1000.0, below="is it in N m per degree?")]
+_StopStiffness = Annotated[
+    float,
+    Quantity("N m/rad", 1.0, 5000.0, "is it in N m per degree?", "no stop is rigid: measure it"),
+]
 _Radius = Annotated[float, Quantity("m", 0.0, 0.5, above="is it in centimetres or millimetres?")]
 Roundness = Annotated[float, Quantity("", 0.05, 50.0)]
 """Radius of a sole where it lies flat, beside its length."""
@@ -74,10 +87,13 @@ class FootPoints(YamlModel):
 
 
 class ContactPoints(YamlModel):
-    """Contact points per condition; those of the bare foot come from proportions if left out."""
+    """Contact points per condition; those of the bare foot come from proportions if left out.
+
+    With an orthosis, one sole counts for the sides that wear it; a foot that is left out is bare.
+    """
 
     barefoot: Sides[FootPoints] | None = None
-    orthosis: Sides[FootPoints] | None = None
+    orthosis: Worn[FootPoints] | None = None
 
 
 class RockerRadius(YamlModel):
@@ -128,24 +144,34 @@ class Examination(YamlModel):
 
 
 class AddedMass(YamlModel):
-    """What orthosis and shoe add to each leg [kg]."""
+    """What orthosis and shoe add to a leg that wears them [kg]."""
 
-    shank: Annotated[float, Quantity("kg", 0.0, 5.0, above="is it in grams?")]
-    foot: Annotated[float, Quantity("kg", 0.0, 5.0, above="is it in grams?")]
+    shank: Worn[Annotated[float, Quantity("kg", 0.0, 5.0, above="is it in grams?")]]
+    foot: Worn[Annotated[float, Quantity("kg", 0.0, 5.0, above="is it in grams?")]]
 
 
 class Springs(YamlModel):
     """One stiffness per direction [N m/rad]."""
 
-    dorsiflexion: Stiffness
-    plantarflexion: Stiffness
+    dorsiflexion: Worn[Stiffness]
+    plantarflexion: Worn[Stiffness]
+
+
+_Stiffnesses = Annotated[tuple[Stiffness, Stiffness], AS_TUPLE]
+
+
+class Stops(YamlModel):
+    """Stiffness of the hard stop of each direction [N m/rad]."""
+
+    dorsiflexion: Worn[_StopStiffness]
+    plantarflexion: Worn[_StopStiffness]
 
 
 class SpringRange(YamlModel):
     """Stiffness that the joint's springs can be tuned to [N m/rad], and who says so."""
 
-    dorsiflexion: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE]
-    plantarflexion: Annotated[tuple[Stiffness, Stiffness], AS_TUPLE]
+    dorsiflexion: Worn[_Stiffnesses]
+    plantarflexion: Worn[_Stiffnesses]
     source: str = Field(min_length=1)
 
 
@@ -189,27 +215,50 @@ _PLANTARFLEXION: Final = Quantity(
 _DIRECTIONS: Final = ("dorsiflexion", "plantarflexion")
 
 
-class OrthosisData(YamlModel):
-    """Ankle-foot orthosis: geometry and springs, angles in rad (+ = plantarflexion)."""
+def _in_order(value: tuple[Side, ...]) -> tuple[Side, ...]:
+    if len(set(value)) < len(value):
+        raise invalid("names a side twice", allowed="[right, left], [right] or [left]")
+    return tuple(side for side in SIDES if side in value)
 
+
+WornSides = Annotated[tuple[Side, ...], AS_TUPLE, Field(min_length=1), AfterValidator(_in_order)]
+
+
+class OrthosisData(YamlModel):
+    """Ankle-foot orthosis: geometry and springs, angles in rad (+ = plantarflexion).
+
+    Every number may be one for all sides that wear it, or one for each.
+    """
+
+    sides: WornSides = SIDES
     mass: AddedMass
-    neutral_angle: Annotated[float, Quantity("rad", -0.6, 0.6, *["is it in degrees?"] * 2)]
-    free_play: Annotated[float, Quantity("rad", 1e-4, 0.2, above="is it in degrees?")]
-    preload_torque: Annotated[float, Quantity("N m", 0.0, 50.0, below="give its size, unsigned")]
-    dorsiflexion_stop: Sides[Annotated[float, _DORSIFLEXION]]
-    plantarflexion_stop: Sides[Annotated[float, _PLANTARFLEXION]]
-    stop_stiffness: Springs
+    neutral_angle: Worn[Annotated[float, Quantity("rad", -0.6, 0.6, *["is it in degrees?"] * 2)]]
+    free_play: Worn[Annotated[float, Quantity("rad", 1e-4, 0.2, above="is it in degrees?")]]
+    preload_torque: Worn[
+        Annotated[float, Quantity("N m", 0.0, 50.0, below="give its size, unsigned")]
+    ]
+    dorsiflexion_stop: Worn[Annotated[float, _DORSIFLEXION]]
+    plantarflexion_stop: Worn[Annotated[float, _PLANTARFLEXION]]
+    stop_stiffness: Stops
     stiffness_guess: Springs
     stiffness_range: SpringRange
     springs: SpringSet | None = None
-    cuff_height: Sides[Length] | None = None
-    cuff_area: Annotated[float, Quantity("m^2", 1e-4, 0.1, above="is it in cm^2?")] | None = None
+    cuff_height: Worn[Length] | None = None
+    cuff_area: Worn[Annotated[float, Quantity("m^2", 1e-4, 0.1, above="is it in cm^2?")]] | None = (
+        None
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _worn(cls, value: Any) -> Any:
+        sides = sides_of(value)
+        return on_sides(cls, value, sides) if sides else value
 
     @model_validator(mode="after")
     def _springs(self) -> OrthosisData:
-        for name in _DIRECTIONS:
-            low, high = getattr(self.stiffness_range, name)
-            guess = getattr(self.stiffness_guess, name)
+        for name, side in product(_DIRECTIONS, self.sides):
+            low, high = getattr(self.stiffness_range, name)[side]
+            guess = getattr(self.stiffness_guess, name)[side]
             key = f"stiffness_range.{name}"
             if low >= high:
                 raise invalid(f"has {key} [{low:g}, {high:g}], which is upside down or empty",
@@ -221,7 +270,7 @@ class OrthosisData(YamlModel):
 
     @model_validator(mode="after")
     def _exact(self) -> OrthosisData:
-        for side in SIDES:
+        for side in self.sides:
             fault = orthosis_fault(self.ranges(side), side)
             if fault is not None:
                 prefix = f"stiffness_range.{fault.spring} " if fault.spring else ""
@@ -230,12 +279,20 @@ class OrthosisData(YamlModel):
 
     def ranges(self, side: str) -> dict[str, tuple[float, float]]:
         """Return every number of the torque curve of a side, springs with their whole range."""
-        single = {n: getattr(self, n) for n in ("neutral_angle", "free_play", "preload_torque")}
+        stops = (f"{name}_stop" for name in _DIRECTIONS)
+        names = ("neutral_angle", "free_play", "preload_torque", *stops)
+        single = {name: getattr(self, name)[side] for name in names}
+        springs: dict[str, tuple[float, float]] = {}
         for name in _DIRECTIONS:
-            single[f"{name}_stop"] = getattr(self, f"{name}_stop")[side]
-            single[f"{name}_stop_stiffness"] = getattr(self.stop_stiffness, name)
-        springs = {f"{name}_stiffness": getattr(self.stiffness_range, name) for name in _DIRECTIONS}
+            single[f"{name}_stop_stiffness"] = getattr(self.stop_stiffness, name)[side]
+            springs[f"{name}_stiffness"] = getattr(self.stiffness_range, name)[side]
         return {**springs, **{name: (value, value) for name, value in single.items()}}
+
+
+def sides_of(orthosis: Any) -> tuple[Side, ...]:
+    """Return the sides that wear an orthosis by its unchecked content; none if that is wrong."""
+    given = orthosis.get("sides", SIDES) if isinstance(orthosis, dict) else ()
+    return tuple(side for side in SIDES if isinstance(given, list | tuple) and side in given)
 
 
 @dataclass(frozen=True)

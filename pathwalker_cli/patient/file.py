@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
-from pathwalker_cli.conventions import SIDES, Condition
+from pathwalker_cli.conventions import SIDES, Condition, Side
 from pathwalker_cli.errors import PatientError, did_you_mean
 from pathwalker_cli.io.fields import Quantity, Sides, YamlModel, invalid
 from pathwalker_cli.io.yaml_file import mapping_in, read_text, validate
@@ -29,6 +29,7 @@ from pathwalker_cli.patient.blocks import (
     Roundness,
     SegmentLengths,
     Strengths,
+    sides_of,
 )
 from pathwalker_cli.patient.proportions import (
     ANKLE_HEIGHT,
@@ -114,13 +115,28 @@ class Patient(YamlModel):
             )
         return self
 
+    @model_validator(mode="before")
+    @classmethod
+    def _sole(cls, value: Any) -> Any:
+        """Let a single sole count for the sides that wear the orthosis."""
+        points = value.get("contact_points") if isinstance(value, dict) else None
+        if not isinstance(points, dict) or not isinstance(sole := points.get("orthosis"), dict):
+            return value
+        if sole.keys() & set(SIDES):
+            return value
+        worn = dict.fromkeys(sides_of(value.get("orthosis")) or SIDES, sole)
+        return {**value, "contact_points": {**points, "orthosis": worn}}
+
     @model_validator(mode="after")
     def _shoe(self) -> Patient:
-        if self.orthosis is not None and self.contact_points.orthosis is None:
-            raise invalid(
-                "has an orthosis but no contact_points.orthosis",
-                mend="add heel and toe of the shoe's sole, [x, z] in m from the ankle",
-            )
+        soles = self.contact_points.orthosis
+        for side in self.braced("orthosis"):
+            if soles is None or soles[side] is None:
+                where = "contact_points.orthosis" + ("" if soles is None else f".{side}")
+                raise invalid(
+                    f"has an orthosis but no {where}",
+                    mend="add heel and toe of the shoe's sole, [x, z] in m from the ankle",
+                )
         return self
 
     @property
@@ -153,6 +169,10 @@ class Patient(YamlModel):
         if self.strengths is None:
             raise self._lacks("strengths", "add them, or estimate them from recordings")
         return self.strengths.vector()
+
+    def braced(self, condition: Condition) -> tuple[Side, ...]:
+        """Return the sides that wear an orthosis in a condition."""
+        return () if self.orthosis is None or condition == "barefoot" else self.orthosis.sides
 
     def require_orthosis(self) -> OrthosisData:
         """Return the orthosis.
@@ -206,11 +226,19 @@ class Patient(YamlModel):
         Raises:
             PatientError: If the patient has no orthosis and its shoe is asked for.
         """
-        given = getattr(self.contact_points, condition)
-        if given is not None:
-            return given
-        if condition == "orthosis":
+        if condition == "barefoot":
+            return self._bare_soles
+        shod = self.contact_points.orthosis
+        if shod is None:
             raise self._lacks("contact_points.orthosis", "add heel and toe of the shoe's sole")
+        soles = self._bare_soles.given | shod.given
+        return Sides[FootPoints](right=soles["right"], left=soles["left"])
+
+    @cached_property
+    def _bare_soles(self) -> Sides[FootPoints]:
+        """Heel and toe of both bare feet, as given or from proportions."""
+        if self.contact_points.barefoot is not None:
+            return self.contact_points.barefoot
         sole = -round(ANKLE_HEIGHT * self.height, 3)
         feet = {side: self.length("foot", side) for side in SIDES}
         points = {
@@ -224,11 +252,10 @@ class Patient(YamlModel):
         default = CUFF_HEIGHT * self.length("shank", side)
         return self.number(f"orthosis.cuff_height.{side}", default)
 
-    @property
-    def cuff_area(self) -> float:
-        """Area on which the cuff presses, in front or behind [m^2]."""
-        shank = sum(self.length("shank", side) for side in SIDES) / len(SIDES)
-        return self.number("orthosis.cuff_area", CUFF_AREA * shank**2)
+    def cuff_area(self, side: str) -> float:
+        """Return the area on which the cuff presses, in front or behind [m^2]."""
+        default = CUFF_AREA * self.length("shank", side) ** 2
+        return self.number(f"orthosis.cuff_area.{side}", default)
 
     @property
     def leg_length(self) -> float:

@@ -19,7 +19,7 @@ from pathwalker_cli.io.yaml_file import validate
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.patient.blocks import SegmentLengths
 
-_IDENTITY: Final = frozenset({"id", "description", "sex", "age_for_regressions_reason"})
+_IDENTITY: Final = frozenset({"id", "description", "sex", "age_for_regressions_reason", "sides"})
 """Keys of a patient's file that hold no number."""
 
 _LISTED: Final = 5
@@ -124,7 +124,8 @@ def _change(
     for depth, part in enumerate(parents):
         holder = _below(holder, part, where, ".".join(parents[:depth]))
     if not _holds_number(_below(holder, last, where, ".".join(parents))):
-        raise ConfigError("holds no number", where=where, allowed="the place of a number")
+        what = "is not given for this patient" if holder[last] is None else "holds no number"
+        raise ConfigError(what, where=where, allowed="the place of a number")
     holder[last] = _mapped(holder[last], change)
 
 

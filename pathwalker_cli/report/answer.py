@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from pathwalker_cli.config.values import differing_values
-from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.conventions import STIFFNESSES, worn_words
 from pathwalker_cli.report.assumptions import in_words
 from pathwalker_cli.report.changes import Outcome, base_of, short, sides_of, together
 from pathwalker_cli.report.content import Section
@@ -15,6 +15,7 @@ from pathwalker_cli.report.springs import left_open, prescribed, recommended
 from pathwalker_cli.report.summaries import SensitivitySummary, UncertaintySummary
 from pathwalker_cli.results.text import interesting
 from pathwalker_cli.studies.sensitivity.result import SHOWN, label_of
+from pathwalker_cli.studies.verdict import stop_warnings
 
 _KINDS = {
     "dorsiflexion": "the spring against the shin leaning forward (K_D)",
@@ -95,19 +96,19 @@ def _pair(sides: Sequence[Outcome], which: int) -> str:
 
 def _wearing(run: ReportRun) -> str:
     """Return what is worn, with the name of the run where it is more than its condition."""
-    worn = "With orthoses" if run.worn else "Barefoot"
+    worn = worn_words(run.braced).capitalize()
     return worn if run.label == run.run.config.condition else f"{worn} ({run.label})"
 
 
 def _springs(run: ReportRun, several: bool) -> str:
     """Return which springs to fit."""
     named = f" of {run.label}" if several else ""
-    if all(prescribed(run, name) for name in STIFFNESSES):
-        return f"The springs{named} were given, not searched for: {_values(run, STIFFNESSES)}."
+    if all(prescribed(run, name) for name in run.springs):
+        return f"The springs{named} were given, not searched for: {_values(run, run.springs)}."
     if run.verdict is None:
-        found = _values(run, STIFFNESSES)
+        found = _values(run, run.springs)
         return f"How sure the springs{named} are was not examined; least effort took {found}."
-    free = [name for name in STIFFNESSES if not prescribed(run, name)]
+    free = [name for name in run.springs if not prescribed(run, name)]
     undecided = [name for name in free if left_open(run, name)]
     if len(undecided) == len(free):
         return (
@@ -169,12 +170,8 @@ def _hinges(run: ReportRun) -> Iterator[str]:
     verdict = run.verdict
     if verdict is None:
         return
-    longest = max((stop.share for stop in verdict.stops if stop.excess > 0.0), default=0.0)
-    if longest:
-        yield (
-            f"{named}the ankles press on the hard stops for up to {100 * longest:.0f} % of the "
-            "stride, so the stiffness of the stops counts as well as that of the springs"
-        )
+    for warning in stop_warnings(verdict):
+        yield f"{named}{warning}"
     if verdict.starts < 2:
         yield f"{named}one local optimum; others were not searched for (starts: 8 does)"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pathwalker_cli.conventions import worn_words
 from pathwalker_cli.report.answer import answer, hinge_section
 from pathwalker_cli.report.assumptions import assumption_section
 from pathwalker_cli.report.changes import JUDGED, change_section, outcomes
@@ -15,7 +16,7 @@ from pathwalker_cli.report.springs import spring_section
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import expanded, measures_in
-from pathwalker_cli.studies.verdict import snapped_warning
+from pathwalker_cli.studies.verdict import snapped_warning, stop_warnings
 
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
@@ -34,15 +35,21 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
         Fact("Height", f"{patient.height:g} m"),
         *_of_runs(runs),
     )
-    named = ", ".join({"orthosis": "with orthoses"}.get(run.label, run.label) for run in runs)
+    named = ", ".join(
+        worn_words(run.braced) if run.label == "orthosis" else run.label for run in runs
+    )
     title = f"Gait of {patient.id}: {named}"
     return Page(title, facts, answer(runs, found), tuple(_warnings(runs)), tuple(sections))
 
 
 def _mass(runs: Sequence[ReportRun]) -> str:
-    """Return the body mass, and what it is with orthoses."""
-    worn = dict.fromkeys(f"{r.evaluation.gait.walker.total_mass:.1f} kg" for r in runs if r.worn)
-    more = f" ({', '.join(worn)} with orthoses)" if worn else ""
+    """Return the body mass, and what it is with what is worn."""
+    worn = dict.fromkeys(
+        f"{run.evaluation.gait.walker.total_mass:.1f} kg {worn_words(run.braced)}"
+        for run in runs
+        if run.worn
+    )
+    more = f" ({', '.join(worn)})" if worn else ""
     return f"{runs[0].patient.body_mass:g} kg{more}"
 
 
@@ -64,6 +71,11 @@ def _warnings(runs: Sequence[ReportRun]) -> list[str]:
             )
         if run.verdict is not None and (warning := snapped_warning(run.verdict)):
             warnings.append(f"{run.label}, springs to take: {warning}")
+        if run.verdict is not None and next(stop_warnings(run.verdict), ""):
+            warnings.append(
+                f"{run.label}: hard stops carry much of what the orthoses exert; what the answer "
+                "hangs on tells how much, and what stiffer ones would change"
+            )
         if _coarse(run):
             warnings.append(
                 f"{run.label}: an independent integrator misses the mesh by more than the config "

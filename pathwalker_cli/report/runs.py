@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from pathwalker_cli.conventions import Side
 from pathwalker_cli.errors import DataError, InputError
 from pathwalker_cli.evaluation.evaluate import Evaluation, evaluate_gait
 from pathwalker_cli.evaluation.run import run_and_gait
@@ -42,6 +43,16 @@ class ReportRun:
     def worn(self) -> bool:
         """Whether orthoses are worn."""
         return self.run.config.condition == "orthosis"
+
+    @property
+    def braced(self) -> tuple[Side, ...]:
+        """The sides that wear one."""
+        return tuple(self.evaluation.gait.walker.device.elements)
+
+    @property
+    def springs(self) -> tuple[str, ...]:
+        """The springs that are worn, in the order of `conventions.STIFFNESSES`."""
+        return self.evaluation.gait.walker.springs
 
     @property
     def date(self) -> str:

@@ -37,13 +37,13 @@ _NO_CHOICE: Final = "The config prescribes all springs: nothing was identified."
 def spring_section(run: ReportRun) -> Section:
     """Return the springs of a run with orthoses: real ones to fit, region, verdict."""
     verdict = run.verdict
-    rows = tuple(_row(run, name) for name in STIFFNESSES)
+    rows = tuple(_row(run, name) for name in run.springs)
     note = (
         "K_D resists dorsiflexion (the shin leaning forward), K_P plantarflexion (the foot "
         f"pointing down); does as well: the cost stays within {100 * SHARE:g} % of the best, all "
         "else optimal"
     )
-    free = any(not prescribed(run, name) for name in STIFFNESSES)
+    free = any(not prescribed(run, name) for name in run.springs)
     lines = (_NOT_JUDGED if free else _NO_CHOICE,) if verdict is None else ()
     facts = tuple(_facts(verdict)) if verdict else ()
     table = Table(_HEAD, rows, notes=(note,), columns="wwnnp")
@@ -55,7 +55,7 @@ def recommended(run: ReportRun) -> dict[str, float]:
     """Return the springs to take [N m/rad]: real ones where the run chose among them."""
     snapped = run.verdict.snapped if run.verdict else None
     chosen = snapped.stiffness if snapped else {}
-    return {name: chosen.get(name, _identified(run, name)) for name in STIFFNESSES}
+    return {name: chosen.get(name, _identified(run, name)) for name in run.springs}
 
 
 def left_open(run: ReportRun, name: str) -> bool:

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import SIDES, STIFFNESSES, to_degrees
+from pathwalker_cli.conventions import STIFFNESSES, to_degrees
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.report.content import Row, Section, Table
 from pathwalker_cli.report.figures import drawn
@@ -171,11 +171,11 @@ def _chosen(run: ReportRun, side: str) -> Chosen:
     """Return the real springs to take of a side, or of both."""
     if run.verdict is None or run.verdict.snapped is None:
         return {}
-    springs, sides = recommended(run), SIDES if side == "both" else (side,)
+    springs = recommended(run)
     return {
         s: (springs[f"dorsiflexion_stiffness_{s}"], springs[f"plantarflexion_stiffness_{s}"])
-        for s in SIDES
-        if s in sides
+        for s in run.braced
+        if side in (s, "both")
     }
 
 

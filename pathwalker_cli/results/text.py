@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -105,8 +105,11 @@ def summary_rows(
         if (value := metrics.get(name)) is not None:
             text = f"{value:.1f} N m/rad ({np.deg2rad(value):.2f} N m/deg)"
             rows.append((measure_of(name).label, text))
-    if metrics.get("peak_shin_force_right") is not None:
-        rows.append(("cuffs press at most", ", ".join(_cuff(metrics, side) for side in SIDES)))
+    cuffs = [
+        _cuff(metrics, side) for side in SIDES if metrics.get(f"peak_shin_force_{side}") is not None
+    ]
+    if cuffs:
+        rows.append(("cuffs press at most", ", ".join(cuffs)))
     told = {key for m in TABLES["summary"] for key in expanded(m)}
     for measure in measures_in("summary"):
         if measure.key not in told and measure.key in metrics:
@@ -236,7 +239,7 @@ def optimum_lines(optima: Sequence[LocalOptimum]) -> list[tuple[str, str]]:
     """Return label and text of every local optimum, best first, and how far they lie apart."""
     lines = []
     for found in optima:
-        springs = ", ".join(f"{value:.1f}" for value in found.stiffness)
+        springs = ", ".join("-" if k is None else f"{k:.1f}" for k in found.stiffness)
         text = f"start {found.start}: cost {found.cost:.5g}, {found.walking_speed:.3f} m/s"
         text += f", K_D r l, K_P r l {springs} N m/rad" if springs else ""
         lines.append(("local optimum", text if found.converged else f"{text}, {found.status}"))
@@ -347,24 +350,11 @@ def angle_words(angle: float) -> str:
 
 def orthosis_rows(orthosis: OrthosisData) -> list[tuple[str, str]]:
     """Return label and text of what is worn on each leg and which springs there are."""
-    mass = orthosis.mass
-    play = float(to_degrees(orthosis.free_play))
-    stops: dict[str, str] = {
-        side: f"{angle_words(orthosis.dorsiflexion_stop[side])} to "
-        f"{angle_words(orthosis.plantarflexion_stop[side])}"
-        for side in SIDES
-    }
-    if len(set(stops.values())) == 1:
-        stops = {" and ".join(SIDES): stops[SIDES[0]]}
-    worn = (
-        f"per leg {mass.shank:g} kg on the shank, {mass.foot:g} kg on the foot; right and "
-        f"left: neutral angle {angle_words(orthosis.neutral_angle)}, play {play:.1f} deg "
-        f"around it, preload {orthosis.preload_torque:g} N m either way"
-    )
-    rows = [("orthosis", worn), *(("stops", f"{side}: {text}") for side, text in stops.items())]
-    span = orthosis.stiffness_range
-    ranges = [f"{k} {_range(getattr(span, name))}" for name, k in _KINDS.items()]
-    rows.append(("springs", f"{', '.join(ranges)} N m/rad ({span.source})"))
+    rows = [
+        (label, text)
+        for label, words in (("orthosis", _joint), ("stops", _stops), ("springs", _springs))
+        for text in _by_side(orthosis, words)
+    ]
     if orthosis.springs is not None:
         named = [
             f"{k} " + ", ".join(f"{s.name} {s.stiffness:g}" for s in getattr(orthosis.springs, n))
@@ -374,5 +364,32 @@ def orthosis_rows(orthosis: OrthosisData) -> list[tuple[str, str]]:
     return rows
 
 
-def _range(pair: tuple[float, float]) -> str:
-    return f"{pair[0]:g} to {pair[1]:g}"
+def _by_side(orthosis: OrthosisData, words: Callable[[OrthosisData, str], str]) -> list[str]:
+    """Return what is to be said of the sides that wear it, equal ones together."""
+    sides: dict[str, list[str]] = {}
+    for side in orthosis.sides:
+        sides.setdefault(words(orthosis, side), []).append(side)
+    only = " only" if len(orthosis.sides) == 1 else ""
+    return [f"{' and '.join(those)}{only}: {text}" for text, those in sides.items()]
+
+
+def _joint(orthosis: OrthosisData, side: str) -> str:
+    mass, play = orthosis.mass, float(to_degrees(orthosis.free_play[side]))
+    return (
+        f"{mass.shank[side]:g} kg on the shank, {mass.foot[side]:g} kg on the foot, neutral angle "
+        f"{angle_words(orthosis.neutral_angle[side])}, play {play:.1f} deg around it, preload "
+        f"{orthosis.preload_torque[side]:g} N m either way"
+    )
+
+
+def _stops(orthosis: OrthosisData, side: str) -> str:
+    low, high = orthosis.dorsiflexion_stop[side], orthosis.plantarflexion_stop[side]
+    stiffness = " and ".join(f"{getattr(orthosis.stop_stiffness, n)[side]:g}" for n in _KINDS)
+    return f"{angle_words(low)} to {angle_words(high)}, as stiff as {stiffness} N m/rad"
+
+
+def _springs(orthosis: OrthosisData, side: str) -> str:
+    span = orthosis.stiffness_range
+    pairs = ((k, getattr(span, name)[side]) for name, k in _KINDS.items())
+    ranges = ", ".join(f"{k} {low:g} to {high:g}" for k, (low, high) in pairs)
+    return f"{ranges} N m/rad ({span.source})"

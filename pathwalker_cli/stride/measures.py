@@ -182,7 +182,7 @@ def _rearmost_pressure(stride: Stride, side: Side) -> float:
 def _cuff_force(stride: Stride, side: Side, sign: float) -> float:
     """Return the largest force of a cuff on the shin (+) or the calf (-) [N]."""
     torque = stride.known("orthosis_torque")[:, SIDES.index(side)]
-    if not stride.walker.device.worn:
+    if side not in stride.walker.device.elements:
         return float("nan")
     return float(max(0.0, (sign * torque).max()) / stride.walker.patient.cuff_height(side))
 
@@ -190,7 +190,7 @@ def _cuff_force(stride: Stride, side: Side, sign: float) -> float:
 def _cuff_pressure(stride: Stride, side: Side) -> float:
     """Return the largest mean pressure under a cuff [Pa]."""
     peak = max(_cuff_force(stride, side, 1.0), _cuff_force(stride, side, -1.0))
-    return peak / stride.walker.patient.cuff_area if stride.walker.device.worn else float("nan")
+    return peak / stride.walker.patient.cuff_area(side)
 
 
 def _stiffness(stride: Stride, side: Side, first: int) -> float:

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.model.elements.muscle import excitation_from_rate
 from pathwalker_cli.model.walker import Walker
@@ -91,10 +90,8 @@ class GaitSeries(Sampled):
 
     @cached_property
     def orthosis_torque(self) -> np.ndarray:
-        """Torques of the orthoses right, left [N m], shape (n, 2); zero when barefoot."""
-        if not self.walker.device.worn:
-            return np.zeros((len(self.time), len(SIDES)))
-        return self.element_force[:, self.walker.columns(self.walker.device.forces)]
+        """Torques of the orthoses right, left [N m], shape (n, 2); zero where none is worn."""
+        return self.walker.device_torques(self.element_force)
 
     @cached_property
     def passive_torque(self) -> dict[str, np.ndarray]:

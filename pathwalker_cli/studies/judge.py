@@ -11,18 +11,24 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.errors import InputError
 from pathwalker_cli.gait.bounds import held
 from pathwalker_cli.gait.neighbourhood import Neighbourhood
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.gait.solution import GaitSolution
+from pathwalker_cli.model.elements.orthosis import stops_of
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.patient.blocks import RealSpring
 from pathwalker_cli.results.text import end_of
 from pathwalker_cli.stride.series import GaitSeries
+from pathwalker_cli.studies.measures import COMPARED, all_measures, slopes
 from pathwalker_cli.studies.verdict import (
+    LOADED,
     SHARE,
+    STIFFER,
     NumberVerdict,
     SnappedSprings,
+    StifferStops,
     StopVerdict,
     Verdict,
 )
@@ -52,18 +58,25 @@ def verdict_of(solution: GaitSolution) -> Verdict | None:
     springs = tuple(_springs(verdicts))
     names = {spring.name for spring in springs}
     snapped = judge.snapped()
+    stops = tuple(map(judge.stop, _stops(judge.optimum.series)))
+    stiffer = judge.stiffer_stops(stops)
     near = [o for o in solution.optima if o.converged]
     best = min((o.cost for o in near), default=0.0)
     return Verdict(
         springs=springs,
         numbers=tuple(v for u, v in verdicts.items() if not names.intersection(_full_names(u))),
-        stops=tuple(_stops(judge.optimum.series)),
+        stops=stops,
         snapped=snapped,
         optima=tuple(o for o in near if o.cost <= best + SHARE * abs(best)),
         starts=len(near),
         solves=judge.solves,
         seconds=time.perf_counter() - began,
+        stiffer_stops=stiffer,
     )
+
+
+_STIFF: Final = 2.0
+"""How many times as stiff stops are made that carry much."""
 
 
 class _Judge:
@@ -127,6 +140,44 @@ class _Judge:
         case = self.optimum.case.with_values(held(self.optimum.config, values))
         return self.resolver.resolve(case, start, insist)
 
+    def stop(self, stop: StopVerdict) -> StopVerdict:
+        """Return a stop with what more stiffness of it would change, if it carries much."""
+        if stop.carried < LOADED:
+            return stop
+        by = self.around.by_factor(_stiffness_of(stop))
+        changes = {key: STIFFER * slope for key, slope in slopes(by).items()}
+        for unknown in self.around.free:
+            ends = by.above.value(unknown) - by.below.value(unknown)
+            changes[unknown.name] = STIFFER * ends / (2.0 * by.step)
+        return replace(stop, stiffer=self._told(changes))
+
+    def stiffer_stops(self, stops: Sequence[StopVerdict]) -> StifferStops | None:
+        """Return the walk with all stops that carry much made stiffer, solved again."""
+        places = [_stiffness_of(stop) for stop in stops if stop.carried >= LOADED]
+        scale = dict(self.optimum.config.variation.scale)
+        scale |= {place: scale.get(place, 1.0) * _STIFF for place in places}
+        try:
+            case = self.optimum.case.with_values({"variation.scale": scale})
+            end = self.resolver.resolve(case) if places else None
+        except InputError:  # no such stop can be computed exactly, or is allowed
+            return None
+        if end is None:
+            return None
+        self.solves += 1
+        if not end.converged:
+            return StifferStops(_STIFF, end.result.status, {})
+        before, after = all_measures(self.optimum), all_measures(end)
+        changes = {name: after[name] - value for name, value in before.items() if name in after}
+        for unknown in self.around.free:
+            changes[unknown.name] = end.value(unknown) - self.optimum.value(unknown)
+        return StifferStops(_STIFF, end.result.status, self._told(changes))
+
+    def _told(self, changes: dict[str, float]) -> dict[str, float]:
+        """Return the changes that a verdict tells, that of the cost as a share."""
+        names = (*(unknown.name for unknown in self.around.free), *COMPARED[1:])
+        share = changes["cost"] / abs(self.optimum.cost)
+        return {"cost": share, **{name: changes[name] for name in names}}
+
     def snapped(self) -> SnappedSprings | None:
         """Return the best choice among the springs that exist, solved again."""
         orthosis = self.optimum.solver.walker.patient.orthosis
@@ -166,6 +217,11 @@ class _Judge:
         )
 
 
+def _stiffness_of(stop: StopVerdict) -> str:
+    """Return the place of a stop's stiffness in the patient's file."""
+    return f"orthosis.stop_stiffness.{stop.stop}.{stop.side}"
+
+
 def _full_names(unknown: Unknown) -> tuple[str, ...]:
     return tuple(number.full_name for number in unknown.numbers)
 
@@ -200,13 +256,21 @@ def _stops(series: GaitSeries) -> Iterator[StopVerdict]:
     weights, walker = series.quadrature, series.walker
     for side, element in walker.device.elements.items():
         fixed, angle = element.fixed(walker.values), series.column(*element.coordinates)
-        for stop, limit, sign in (
-            ("dorsiflexion", fixed.dorsiflexion_stop, -1.0),
-            ("plantarflexion", fixed.plantarflexion_stop, 1.0),
-        ):
-            beyond = sign * (angle - limit)
-            share = float(weights @ (beyond > 0.0) / weights.sum())
-            yield StopVerdict(side, stop, float(limit), float(beyond.max()), share)
+        torque = series.element_force[:, walker.columns([element])[0]]
+        for stop in stops_of(fixed, *element.springs(walker.values)):
+            beyond, resisting = stop.beyond(angle), np.maximum(-stop.sign * torque, 0.0)
+            on_stop = np.where(beyond > 0.0, np.maximum(resisting - stop.spring, 0.0), 0.0)
+            whole = float(weights @ resisting)
+            yield StopVerdict(
+                side,
+                stop.name,
+                float(stop.angle),
+                float(beyond.max()),
+                float(weights @ (beyond > 0.0) / weights.sum()),
+                float(on_stop.max()),
+                float(weights @ on_stop) / whole if whole else 0.0,
+                float(stop.stiffness),
+            )
 
 
 _SOLVES: Final = 8

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.gait.neighbourhood import Derivative
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.stride.measure import Measure
@@ -27,6 +28,13 @@ Ranges = Mapping[str, tuple[float, float]]
 def all_measures(optimum: Optimum) -> dict[str, float]:
     """Return the cost and every single number of the gait."""
     return {"cost": optimum.cost, **numbers_of(stride_of(optimum.series))}
+
+
+def slopes(at: Derivative) -> dict[str, float]:
+    """Return the derivatives of the cost and of every single number of the gait."""
+    below, above = all_measures(at.below), all_measures(at.above)
+    found = {key: (above[key] - below[key]) / (2.0 * at.step) for key in above if key in below}
+    return {**found, "cost": at.cost}
 
 
 def measures(optimum: Optimum) -> dict[str, float]:
@@ -51,10 +59,10 @@ def measures_with(units: Mapping[str, str]) -> tuple[Measure, ...]:
 def ranges_of(optimum: Optimum) -> dict[str, tuple[float, float]]:
     """Return the allowed range of every spring and unknown; none where it follows another one."""
     ranges = dict(optimum.solver.bounds.ranges)
-    springs = STIFFNESSES if optimum.config.condition == "orthosis" else ()
+    springs = optimum.solver.walker.springs
     if not all(name in ranges for name in springs):
-        values = zip(springs, optimum.stiffness.tolist(), strict=True)
-        ranges = {name: (value, value) for name, value in values} | ranges
+        values = dict(zip(STIFFNESSES, optimum.stiffness.tolist(), strict=True))
+        ranges = {name: (values[name], values[name]) for name in springs} | ranges
     return {name: ranges[name] for name in dict.fromkeys((*springs, *ranges))}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +25,15 @@ _DETERMINED: Final = 0.25
 _ROUGHLY: Final = 0.75
 """Share of the range of springs up to which a region still says something."""
 
+
+LOADED: Final = 0.25
+"""Share of an orthosis' torque from which on a stop counts as one of its springs."""
+
+STIFFER: Final = 0.1
+"""How much stiffer a stop is made, as a share."""
+
+_VISIBLE: Final = 0.05
+"""Change of a number from which on it is told [its unit, deg]."""
 
 NOT_DETERMINED: Final = "not determined"
 
@@ -98,6 +107,12 @@ class StopVerdict:
         angle: Angle of the stop [rad].
         excess: How far the ankle goes beyond it at most [rad]; negative if it is not reached.
         share: Share of the stride beyond it.
+        torque: The largest torque on it [N m].
+        carried: Its share of the impulse of what the orthosis exerts in its direction.
+        stiffness: Its stiffness [N m/rad].
+        stiffer: What `STIFFER` more stiffness of it changes, to first order, all else optimal
+            again: the cost as a share, then measures and free numbers by name [SI].  Empty where it
+            carries less than `LOADED`.
     """
 
     side: str
@@ -105,6 +120,10 @@ class StopVerdict:
     angle: float
     excess: float
     share: float
+    torque: float = 0.0
+    carried: float = 0.0
+    stiffness: float = 0.0
+    stiffer: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -127,13 +146,30 @@ class SnappedSprings:
 
 
 @dataclass(frozen=True)
+class StifferStops:
+    """The walk with all stops that carry much made stiffer, all else solved again.
+
+    Args:
+        factor: Times their stiffness.
+        status: "converged", or why not.
+        changes: What it changes, as `StopVerdict.stiffer`; empty without a solution.
+    """
+
+    factor: float
+    status: str
+    changes: dict[str, float]
+
+
+@dataclass(frozen=True)
 class Verdict:
     """All that is known about an identification.
 
     Args:
-        springs: Every spring, in the order of `conventions.STIFFNESSES`.
+        springs: Every spring that is worn, in the order of `conventions.STIFFNESSES`.
         numbers: Every other number that was free to choose.
         stops: Every hard stop.
+        stiffer_stops: The walk with stiffer stops; None where none carries much, or where the
+            torque curve would not be exact.
         snapped: The choice among real springs; None where the file lists none.
         optima: Other local optima within `SHARE` of the best.
         starts: Number of starts that converged.
@@ -149,6 +185,7 @@ class Verdict:
     starts: int
     solves: int
     seconds: float
+    stiffer_stops: StifferStops | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything as plain values; SI units, shares of 1."""
@@ -234,6 +271,8 @@ def verdict_lines(verdict: Verdict) -> Iterator[tuple[str, str]]:
         yield number.label, number_text(number)
     reached = [stop for stop in verdict.stops if stop.excess > 0.0]
     yield "hard stops", "; ".join(map(stop_text, reached)) or "none is reached"
+    for warning in stop_warnings(verdict):
+        yield "", f"WARNING: {warning}"
     if verdict.starts > 1:
         yield "other optima", _optima(verdict)
     else:
@@ -321,11 +360,58 @@ def reservations(number: NumberVerdict) -> Iterator[str]:
 
 
 def stop_text(stop: StopVerdict) -> str:
-    """Return how far and how long the ankle goes beyond a stop."""
-    return (
+    """Return how far and how long the ankle goes beyond a stop, and what the stop carries."""
+    text = (
         f"{stop.side} {stop.stop} stop ({to_degrees(abs(stop.angle)):.1f} deg) exceeded by "
         f"{to_degrees(stop.excess):.1f} deg, {100 * stop.share:.0f} % of the stride"
     )
+    if not stop.torque:
+        return text
+    return f"{text}, by up to {stop.torque:.1f} N m ({100 * stop.carried:.0f} % of the impulse)"
+
+
+def stop_warnings(verdict: Verdict) -> Iterator[str]:
+    """Yield what to know where stops carry much of what the orthoses exert; nothing elsewhere."""
+    loaded = [stop for stop in verdict.stops if stop.carried >= LOADED]
+    if not loaded:
+        return
+    shares = ", ".join(f"{s.side} {s.stop} stop {100 * s.carried:.0f} %" for s in loaded)
+    yield (
+        f"hard stops carry much of what the orthosis exerts in their direction: {shares}; their "
+        "stiffness (orthosis.stop_stiffness) decides as that of the springs does: measure it"
+    )
+    moves = "; ".join(
+        f"{stop.side} {stop.stop} stop {_changes(verdict, stop.stiffer)}"
+        for stop in loaded
+        if stop.stiffer
+    )
+    if moves:
+        yield f"{100 * STIFFER:g} % more stiffness of a stop changes, to first order: {moves}"
+    twice = verdict.stiffer_stops
+    if twice is not None and twice.status == "converged":
+        moved = _changes(verdict, twice.changes)
+        yield f"with {twice.factor:g} times the stiffness of these stops, solved again: {moved}"
+    elif twice is not None:
+        yield f"with {twice.factor:g} times the stiffness of these stops: {twice.status}"
+
+
+def _changes(verdict: Verdict, changes: Mapping[str, float]) -> str:
+    """Return how the cost moves, then every number and measure that does so visibly."""
+    numbers = {number.name: number for number in (*verdict.springs, *verdict.numbers)}
+    parts = [f"cost {100 * changes['cost']:+.2g} %"]
+    for name, change in changes.items():
+        if name in numbers:
+            number = numbers[name]
+            angle = number.unit == "rad"
+            size, unit = (float(to_degrees(change)), "deg") if angle else (change, number.unit)
+            if abs(size) >= _VISIBLE:
+                parts.append(f"{number.label} {size:+.2g} {unit}")
+        elif name != "cost":
+            measure = measure_of(name)
+            text = measure.text(change, sign=True)
+            if float(text):
+                parts.append(f"{measure.label} {text} {measure.shown_unit}".rstrip())
+    return ", ".join(parts)
 
 
 def _optima(verdict: Verdict) -> str:
@@ -338,7 +424,7 @@ def _optima(verdict: Verdict) -> str:
         if spring.prescribed:
             continue
         row = STIFFNESSES.index(spring.name)
-        values = [optimum.stiffness[row] for optimum in verdict.optima]
+        values = [k for optimum in verdict.optima if (k := optimum.stiffness[row]) is not None]
         spread.append(f"{measure_of(spring.name).label} {min(values):.0f} to {max(values):.0f}")
     return f"{text}, with {', '.join(spread)} N m/rad"
 

@@ -60,8 +60,7 @@ def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:
     middle, play, preload = side.neutral_angle, side.free_play, side.preload_torque
     reach_d = (middle - play / 2) - side.dorsiflexion_stop
     reach_p = side.plantarflexion_stop - (middle + play / 2)
-    over_d = BLEND * (preload + reach_d * k_d)
-    over_p = BLEND * (preload + reach_p * k_p)
+    over_d, over_p = (BLEND * stop.spring for stop in stops_of(side, k_d, k_p))
     steep_d, meeting_d = _preload_rise(play, preload, k_d)
     steep_p, meeting_p = _preload_rise(play, preload, k_p)
     steep = steep_d * steep_p
@@ -98,6 +97,43 @@ def orthosis_curve(side: OrthosisSide, k_d: Any, k_p: Any) -> BezierChain:
         side.plantarflexion_stop,
     ]
     return BezierChain(x, y, slopes, CURVINESS, corners=corners)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A hard stop.
+
+    Args:
+        name: "dorsiflexion" or "plantarflexion".
+        sign: Sign of ankle angles beyond it: -1 or 1.
+        angle: Where it is [rad].
+        stiffness: Its stiffness [N m/rad].
+        spring: Torque of its spring there [N m]: the spring is bent no further, and whatever the
+            orthosis exerts beyond is on the stop.
+    """
+
+    name: str
+    sign: float
+    angle: Any
+    stiffness: Any
+    spring: Any
+
+    def beyond(self, angle: Any) -> Any:
+        """Return how far an ankle angle is beyond it [rad], negative before it."""
+        return self.sign * (angle - self.angle)
+
+
+def stops_of(side: OrthosisSide, k_d: Any, k_p: Any) -> tuple[Stop, Stop]:
+    """Return the stops behind K_D and K_P; see `orthosis_curve` for the arguments."""
+    half = side.free_play / 2
+    reach_d = (side.neutral_angle - half) - side.dorsiflexion_stop
+    reach_p = side.plantarflexion_stop - (side.neutral_angle + half)
+    return (
+        Stop("dorsiflexion", -1.0, side.dorsiflexion_stop, side.dorsiflexion_stop_stiffness,
+             side.preload_torque + reach_d * k_d),
+        Stop("plantarflexion", 1.0, side.plantarflexion_stop, side.plantarflexion_stop_stiffness,
+             side.preload_torque + reach_p * k_p),
+    )  # fmt: skip
 
 
 def _preload_rise(play: Any, preload: Any, stiffness: Any) -> tuple[Any, Any]:

@@ -27,13 +27,14 @@ def orthosis_curves(series: GaitSeries, reference: Reference | None = None) -> F
     Raises:
         InputError: If the walker wears no orthoses.
     """
-    if series.walker.orthosis is None:
+    worn = series.walker.orthosis
+    if not worn:
         raise InputError("a barefoot walker has no orthosis curve", allowed="condition orthosis")
     fig = style.new_figure(2.4)
-    panels = fig.subplots(1, 2, sharex=True, sharey=True)
-    for i, (ax, side) in enumerate(zip(panels, SIDES, strict=True)):
-        _draw_orthosis(ax, series, side, series.walker.orthosis[i])
-        style.dress(ax, _title(series, side), _ANGLE, _TORQUE if i == 0 else "")
+    panels = fig.subplots(1, len(worn), sharex=True, sharey=True, squeeze=False)[0]
+    for ax, (side, orthosis) in zip(panels, worn.items(), strict=True):
+        _draw_orthosis(ax, series, side, orthosis)
+        style.dress(ax, _title(series, side), _ANGLE, _TORQUE if ax is panels[0] else "")
     curve, stop = style.entry("curve", linewidth=0.8), {"linewidth": 0.8, "linestyle": "-."}
     walked = style.entry("part that was walked", linewidth=3.0, alpha=0.5)
     style.legend(fig, [curve, walked, style.entry("stop", **stop)])

@@ -57,9 +57,11 @@ def joint_moments(series: GaitSeries, reference: Reference | None = None) -> Fig
     bands, fig = reference.moments if reference else {}, style.new_figure(2.9)
     panels = fig.subplots(2, 2).ravel()
     handles = _draw(panels, series, MOMENTS, _MOMENTS, bands, lambda curve: "net moment [N m/kg]")
-    if series.walker.orthosis:
+    if series.walker.device.worn:
         torques = MOMENTS[-1].factor(series.walker) * series.orthosis_torque
         for side, torque in zip(SIDES, torques.T, strict=True):
+            if side not in series.walker.device.elements:
+                continue
             _draw_side(panels[2], series, side, torque, linewidth=0.7)
         handles.append(style.entry("thin: orthosis alone", linewidth=0.7))
     stride = stride_of(series)

@@ -48,7 +48,7 @@ _METADATA: Final[dict[str, dict[str, str | None]]] = {
 
 def figure_names(series: GaitSeries) -> tuple[str, ...]:
     """Return the figures that make sense for a stride: no orthosis curve when barefoot."""
-    worn = series.walker.orthosis is not None
+    worn = series.walker.device.worn
     return tuple(name for name in FIGURES if worn or name != "orthosis_curves")
 
 

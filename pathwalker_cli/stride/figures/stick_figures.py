@@ -45,7 +45,7 @@ def stick_figures(series: GaitSeries, reference: Reference | None = None) -> Fig
         ax.grid(visible=False)
     force = f"ground force; 1 body weight is as\nlong as {style.FORCE_LENGTH:g} pelvis heights"
     force_look = {"color": style.FORCE_COLOUR, "linewidth": 1.4}
-    style.legend(fig, [*_leg_entries(), style.entry(force, **force_look)])
+    style.legend(fig, [*_leg_entries(), style.entry(force, **force_look), *_brace_entry(stride)])
     return fig
 
 
@@ -63,10 +63,13 @@ def walks_figure(walks: Sequence[tuple[str, Stride]]) -> Figure:
         ax.set_title(label, loc="left", weight="bold")
         ax.grid(visible=False)
     panels[-1].set_xlabel("right gait cycle from the right foot strike [%], figures moved apart")
-    worn = any(stride.walker.orthosis for _, stride in walks)
-    brace = [style.entry("orthosis", **_BRACE)] if worn else []
-    style.legend(fig, [*_leg_entries(), *brace], columns=3)
+    brace = [entry for _, stride in walks for entry in _brace_entry(stride)]
+    style.legend(fig, [*_leg_entries(), *brace[:1]], columns=3)
     return fig
+
+
+def _brace_entry(stride: Stride) -> list[Any]:
+    return [style.entry("orthosis", **_BRACE)] if stride.walker.device.worn else []
 
 
 def _leg_entries() -> list[Any]:
@@ -82,7 +85,7 @@ def _draw_row(ax: Axes, stride: Stride, row: Sequence[int]) -> np.ndarray:
         q = np.array([np.interp(time, stride.time, column) for column in stride.q.T])
         shift = np.array([slot - q[0], 0.0])
         points = {n: p + shift for n, p in body_points(stride.walker, q).items()}
-        _draw_body(ax, points, stride.walker.orthosis is not None)
+        _draw_body(ax, points, tuple(stride.walker.device.elements))
     margin = height * _SPACING / 2
     ax.axhline(0.0, color=style.NEUTRAL, linewidth=0.8, zorder=1)
     ax.set_xlim(slots[0] - margin, slots[-1] + margin)
@@ -112,14 +115,14 @@ def _draw_forces(ax: Axes, series: GaitSeries, time: float, slot: float) -> None
                       angles="xy", scale_units="xy", scale=1.0, width=0.006, zorder=5)  # fmt: skip
 
 
-def _draw_body(ax: Axes, points: dict[str, np.ndarray], brace: bool) -> None:
-    """Draw legs, feet, pelvis, trunk and head, with an orthosis on each leg if it is worn."""
+def _draw_body(ax: Axes, points: dict[str, np.ndarray], braced: Sequence[Side]) -> None:
+    """Draw legs, feet, pelvis, trunk and head, and an orthosis on the legs that wear one."""
     for side in SIDES:
         s, look = SUFFIX[side], _LEG_LOOK[side]
         _draw_chain(ax, points, ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}"), look)
         foot = (f"ankle_{s}", f"heel_{s}", f"toe_{s}", f"ankle_{s}")
         _draw_chain(ax, points, foot, look | {"linewidth": 0.8})
-        if brace:
+        if side in braced:
             calf = 0.25 * points[f"ankle_{s}"] + 0.75 * points[f"knee_{s}"]
             shell = {"calf": calf, **points}
             _draw_chain(ax, shell, ("calf", f"ankle_{s}", f"heel_{s}", f"toe_{s}"), _BRACE)

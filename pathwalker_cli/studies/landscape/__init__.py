@@ -18,6 +18,7 @@ from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, YamlModel, invalid
 from pathwalker_cli.model.numbers import Unknown
+from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import NeighbourStudy, Plan, StudyKind, Work
@@ -151,8 +152,25 @@ def _axes(study: LandscapeStudy, solver: GaitSolver) -> tuple[Springs, list[np.n
     return springs, values
 
 
+def on_worn_side(study: LandscapeStudy, walker: Walker) -> LandscapeStudy:
+    """Return a study of the only side that wears an orthosis; itself where both do.
+
+    Raises:
+        ConfigError: If it asks for the side that wears none.
+    """
+    worn = tuple(walker.device.elements)
+    if len(worn) != 1:
+        return study
+    if study.side not in (*worn, "both"):
+        raise ConfigError(
+            f"is {study.side}, a side that wears no orthosis", where="side", allowed=worn[0]
+        )
+    return study.model_copy(update={"side": worn[0]})
+
+
 def plan(study: LandscapeStudy, solver: GaitSolver) -> Plan:
     """Return the size of the grid."""
+    study = on_worn_side(study, solver.walker)
     _, (k_d, k_p) = _axes(study, solver)
     does = (
         f"a grid of {k_d.size} x {k_p.size} stiffnesses, springs {study.side}, up to "
@@ -201,6 +219,7 @@ def landscape_of(study: LandscapeStudy, run: Run, work: Work) -> Landscape:
         NotConvergedError: If the user stopped it, or there is nothing to begin with.
     """
     near = Neighbours(run, work.folder / "points", study.max_iterations, work.report)
+    study = on_worn_side(study, near.optimum.solver.walker)
     springs, (k_d, k_p) = _axes(study, near.optimum.solver)
     both = near.optimum.stiffness.reshape(2, 2)[:, [SIDES.index(side) for side in study.sides]]
     graph = grid(k_d, k_p, tuple(np.exp(np.log(both).mean(axis=1)).tolist()))

@@ -11,17 +11,16 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.gait.bounds import held
-from pathwalker_cli.gait.neighbourhood import Derivative, Neighbourhood
+from pathwalker_cli.gait.neighbourhood import Neighbourhood
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.gait.symmetry import require_symmetry
-from pathwalker_cli.io.fields import Quantity
+from pathwalker_cli.io.fields import Quantity, Sides
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.patient import Patient
-from pathwalker_cli.patient.blocks import SegmentLengths, Strengths
+from pathwalker_cli.patient.blocks import SegmentLengths, Stops, Strengths
 from pathwalker_cli.patient.variation import Variation, varied
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import (
@@ -32,7 +31,7 @@ from pathwalker_cli.studies.base import (
     require_optimum,
     resolver_of,
 )
-from pathwalker_cli.studies.measures import all_measures, measures
+from pathwalker_cli.studies.measures import all_measures, measures, slopes
 from pathwalker_cli.studies.neighbours import Journal
 from pathwalker_cli.studies.sensitivity.result import (
     FILES,
@@ -49,11 +48,7 @@ POINTS: Final = "points"
 
 _ORTHOSIS: Final = ("neutral_angle", "free_play", "preload_torque")
 
-_ORTHOSIS_PAIRS: Final = {
-    "dorsiflexion_stop": SIDES,
-    "plantarflexion_stop": SIDES,
-    "stop_stiffness": ("dorsiflexion", "plantarflexion"),
-}
+_STOPS: Final = ("dorsiflexion_stop", "plantarflexion_stop")
 
 Step = Annotated[float, Quantity("", 1e-5, 0.2, above="is it in percent?")]
 
@@ -76,7 +71,8 @@ def default_places(patient: Patient, with_orthosis: bool) -> tuple[str, ...]:
     places = []
     if with_orthosis:
         places += [f"orthosis.{name}" for name in _ORTHOSIS]
-        places += [f"orthosis.{name}.{end}" for name, two in _ORTHOSIS_PAIRS.items() for end in two]
+        places += [f"orthosis.{n}.{s}" for n in _STOPS for s in patient.braced("orthosis")]
+        places += [f"orthosis.stop_stiffness.{name}" for name in Stops.model_fields]
     places += ["strengths"]
     for name in Strengths.model_fields:
         sides = ("",) if name.startswith("lumbar") else (".right", ".left")
@@ -165,17 +161,10 @@ def _sensitivity(around: Neighbourhood, place: str, base: Mapping[str, float]) -
         derivative, unit = around.by_unknown(unknown), around.optimum.value(unknown)
     else:
         derivative, unit = around.by_factor(place), 1.0
-    derivatives = {key: unit * slope for key, slope in _slopes(derivative).items()}
+    derivatives = {key: unit * slope for key, slope in slopes(derivative).items()}
     elasticities = {key: slope / base[key] if base[key] else None
                     for key, slope in derivatives.items()}  # fmt: skip
     return Sensitivity(place, value, derivatives, elasticities)
-
-
-def _slopes(at: Derivative) -> dict[str, float]:
-    """Return the derivatives of all measures."""
-    below, above = all_measures(at.below), all_measures(at.above)
-    slopes = {key: (above[key] - below[key]) / (2.0 * at.step) for key in above if key in below}
-    return {**slopes, "cost": at.cost}
 
 
 def _unknown(optimum: Optimum, place: str) -> Unknown | None:
@@ -190,6 +179,8 @@ def _value(optimum: Optimum, place: str) -> float | None:
     value: Any = optimum.solver.walker.patient
     for part in place.split("."):
         value = getattr(value, part, None)
+    if isinstance(value, Sides) and len(alike := set(value.given.values())) == 1:
+        (value,) = alike
     return float(value) if isinstance(value, int | float) else None
 
 

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, PlainSerializer, TypeAdapter
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.io.csv_file import write_table
 from pathwalker_cli.io.json_file import write_json
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.measures import measures_with
 
 FILES: Final = ("tradeoff.csv", "tradeoff.json")
@@ -146,7 +147,8 @@ class Tradeoff:
     @property
     def springs(self) -> tuple[str, ...]:
         """Springs that there are; none barefoot."""
-        return STIFFNESSES if self.condition == "orthosis" else ()
+        worn = STIFFNESSES if self.condition == "orthosis" else ()
+        return tuple(name for name in worn if self.optimum.get(name) is not None)
 
 
 def judged(points: Sequence[FrontPoint]) -> tuple[FrontPoint, ...]:
@@ -194,9 +196,9 @@ def write_tables(tradeoff: Tradeoff, folder: Path) -> None:
 
 def tradeoff_lines(tradeoff: Tradeoff) -> list[str]:
     """Return the table and what it took, line by line."""
-    with_springs = bool(tradeoff.springs)
-    heading = ["weight", "speed", "effort", *(["K_D r", "K_D l", "K_P r", "K_P l"] * with_springs)]
-    units = ["s^2/m^2", "m/s", "s/m", *(["N m/rad"] * 4 * with_springs)]
+    springs = tradeoff.springs
+    heading = ["weight", "speed", "effort", *(measure_of(name).short for name in springs)]
+    units = ["s^2/m^2", "m/s", "s/m", *(["N m/rad"] * len(springs))]
     lines = ["".join(f"{cell:>9}" for cell in row) for row in (heading, units)]
     lines += [_line(tradeoff, point) for point in tradeoff.points]
     return [*lines, "", *(f"{label:<22}{text}" for label, text in _notes(tradeoff))]
