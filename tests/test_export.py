@@ -63,7 +63,7 @@ def lively(walker: Walker, count: int = 12) -> GaitSeries:
     elements = walker.element_forces(q, v, activation)
     vdot = np.zeros_like(q)
     for row, driven in enumerate(walker.generalised_forces(elements)):
-        mass, bias, jacobian, _ = map(np.asarray, walker.dynamics_terms(q[row], v[row]))
+        mass, bias, jacobian, *_ = map(np.asarray, walker.dynamics_terms(q[row], v[row]))
         vdot[row] = np.linalg.solve(mass, driven + jacobian.T @ force[row] - bias.ravel())
     return GaitSeries(
         walker=walker,

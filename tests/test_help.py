@@ -264,7 +264,7 @@ def test_a_solve_prints_one_document(solve: Callable[..., Result], here: Path) -
 
 def test_a_solve_begins_with_what_is_worn(solve: Callable[..., Result]) -> None:
     lines = solve("--out", "mine").stderr.splitlines()
-    assert lines[0].startswith("orthosis: per leg ")
+    assert lines[0].startswith("orthosis: right and left: ")
     assert "neutral angle" in lines[0]
     assert lines[1].startswith("stops: right: ")
     assert "neutral angle" not in solve("--out", "mine", "--quiet").stderr

@@ -75,6 +75,7 @@ WORDS: dict[str, tuple[str, ...]] = {
               "--set", "smoothing=[0.0]", "--set",
               "numbers={strengths.ankle_flexion.left: {prior: 6, factor: 2, range: [1, 60]}}"),
     "evaluate": ("worn", "bare", "-o", "out"),
+    "export": ("worn", "-o", "out", "--opensim"),
     "verify": ("worn",),
     "rerun": ("worn", "--out", "out"),
     "compare": ("worn", "bare", "-o", "out"),
