@@ -144,6 +144,8 @@ def test_the_other_typical_walks_come_before_the_spread() -> None:
     starts = [each.config.start for each in spread_starts(GaitSolver(case))]
     kinds = [(start.gait, start.walk) for start in starts]
     assert kinds == [("typical", 0), ("typical", 1), ("typical", 2), *2 * [("synthetic", 0)]]
+    case = load_case("mapd-orthosis", changes=("starts=2", "start.walk=2"))
+    assert [each.config.start.walk for each in spread_starts(GaitSolver(case))] == [2, 0]
 
 
 def test_shooting_solves_predictions_only() -> None:

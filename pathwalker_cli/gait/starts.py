@@ -48,13 +48,11 @@ def spread_starts(solver: GaitSolver) -> list[Case]:
     low = [*(pair[0] for pair in spread), *lower]
     high = [*(pair[1] for pair in spread), *upper]
     walks = len(typical_walks(solver.walker)) if config.start.gait == "typical" else 0
-    studies = [single]
-    for walk in range(min(walks, config.starts)):
-        if walk != config.start.walk:
-            start = config.start.model_copy(update={"walk": walk})
-            studies.append(single.model_copy(update={"start": start}))
+    others = [walk for walk in range(walks) if walk != config.start.walk][: config.starts - 1]
+    starts = [config.start.model_copy(update={"walk": walk}) for walk in others]
+    studies = [single, *(single.model_copy(update={"start": start}) for start in starts)]
     cube = qmc.LatinHypercube(len(low), rng=np.random.default_rng(config.start.seed))
-    points = qmc.scale(cube.random(config.starts - len(studies)), low, high)
+    points = np.array(low) + cube.random(config.starts - len(studies)) * np.subtract(high, low)
     for knee_flexion, stride_ratio, faster, *free in points.tolist():
         start = config.start.model_copy(
             update={
