@@ -1,7 +1,7 @@
 """How children converge who are not like the shipped one: the table of docs/hard-cases.md.
 
 Fifty made-up children, ten kinds of strength and build at five ages, each barefoot and with one of
-five orthoses, all from the synthetic start with the shipped settings: ``python
+five orthoses, all with the shipped settings: ``python
 benchmarks/hard_cases.py FOLDER``.  The folder is a study of `pathwalker batch`: the same command
 goes on where it was stopped.
 """
