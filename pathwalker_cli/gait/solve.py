@@ -78,6 +78,7 @@ class GaitSolver:
         default_factory=lambda: {"build": 0.0, "solve": 0.0, "verify": 0.0}
     )
     shortfall: Shortfall | None = field(default=None, init=False)
+    _estimated: tuple[NlpResult, CostError | None] | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         """Build walker, bounds and the blocks of the problem."""
@@ -409,11 +410,12 @@ class GaitSolver:
         return meshing.costly(error.shares, allowed * (choices.COST_AIM if size > allowed else 1.0))
 
     def _cost_error(self, program: CollocationProgram, result: NlpResult) -> CostError | None:
-        """Return what halving every interval would change the cost by, as estimated."""
-        began = time.perf_counter()
-        error = cost_error(program, result)
-        self.seconds["verify"] += time.perf_counter() - began
-        return error
+        """Return what halving every interval would change the cost by, estimated once."""
+        if self._estimated is None or self._estimated[0] is not result:
+            began = time.perf_counter()
+            self._estimated = result, cost_error(program, result)
+            self.seconds["verify"] += time.perf_counter() - began
+        return self._estimated[1]
 
     def _finish(
         self, program: CollocationProgram, result: NlpResult, errors: Reintegration, start: str

@@ -93,7 +93,8 @@ def run_study(
     solution = _solve(case, earlier, log)
     verdict = verdict_of(solution) if case.config.verdict else None
     lines = _log_lines(solution, inputs, log)
-    lines += [f"{label}: {text}" for label, text in verdict_lines(verdict)] if verdict else []
+    told = verdict_lines(verdict) if verdict else ()
+    lines += [": ".join(filter(None, pair)) for pair in told]
     more = {"verdict": None if verdict is None else verdict.as_dict()}
     try:
         metrics = write_run(folder, solution, lines, inputs, more)
