@@ -12,7 +12,7 @@ from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.cost_error import cost_error
-from tests.test_collocation import at_rest, double_integrator
+from test_collocation import at_rest, double_integrator
 
 
 def solved(intervals: int) -> tuple[CollocationProgram, NlpResult]:
