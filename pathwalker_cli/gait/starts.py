@@ -52,6 +52,7 @@ def spread_starts(solver: GaitSolver) -> list[Case]:
     starts = [config.start.model_copy(update={"walk": walk}) for walk in others]
     studies = [single, *(single.model_copy(update={"start": start}) for start in starts)]
     cube = qmc.LatinHypercube(len(low), rng=np.random.default_rng(config.start.seed))
+    # qmc.scale refuses to scale no points at all
     points = np.array(low) + cube.random(config.starts - len(studies)) * np.subtract(high, low)
     for knee_flexion, stride_ratio, faster, *free in points.tolist():
         start = config.start.model_copy(

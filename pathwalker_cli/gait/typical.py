@@ -19,7 +19,7 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, ROOT
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.motion_file import read_arrays, read_motion
-from pathwalker_cli.model.contact import contact_pattern
+from pathwalker_cli.model.contact import Feet, contact_pattern
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.paths import shipped
@@ -90,8 +90,9 @@ def typical_walks(walker: Walker) -> list[TypicalWalk]:
 
     Soles that give way begin with the walks of soles that roll.  There are none for rarer patterns.
     """
-    phases = (contact_pattern("sole") if walker.parts.compliant else walker.pattern).names
-    paths = sorted((shipped("configs") / "walks").glob(f"*-{walker.condition}.npz"))
+    feet: Feet = "sole" if walker.parts.compliant else walker.parts.feet
+    phases = contact_pattern(feet, walker.parts.contact).names
+    paths = sorted((shipped("configs") / "walks").glob(f"*-{feet}-{walker.condition}.npz"))
     walks = (TypicalWalk.read(path) for path in paths)
     fitting = [walk for walk in walks if walk.phases == phases]
     return sorted(fitting, key=lambda walk: walk.distance(walker))
