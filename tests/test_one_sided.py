@@ -34,11 +34,11 @@ from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.figures.save import make_figure
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.stride import stride_of
-from pathwalker_cli.studies.judge import _Judge, _stops, verdict_of
 from pathwalker_cli.studies.landscape import LandscapeStudy, on_worn_side
 from pathwalker_cli.studies.measures import COMPARED
 from pathwalker_cli.studies.sensitivity import default_places
 from pathwalker_cli.studies.verdict import LOADED, STIFFER, verdict_of_metrics
+from pathwalker_cli.studies.verdict.judge import _Judge, _stops, verdict_of
 
 SHIPPED = "sreenivasa2017-patient"
 LEFT = {"dorsiflexion_stop": {"left": -0.12}, "plantarflexion_stop": 0.09, "sides": ["left"]}

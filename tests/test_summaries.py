@@ -17,7 +17,8 @@ from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.metrics import RunMetrics
-from pathwalker_cli.studies.verdict import verdict_lines, verdict_of_metrics
+from pathwalker_cli.studies.verdict import verdict_of_metrics
+from pathwalker_cli.studies.verdict.words import verdict_lines
 from report_runs import write_made_run
 from test_report import write_studies
 

@@ -19,7 +19,6 @@ from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.yaml_file import validate
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.patient.blocks import RealSpring, SpringSet
-from pathwalker_cli.studies.judge import _nearest, _quadratic_edge, _stops, verdict_of
 from pathwalker_cli.studies.verdict import (
     LOADED,
     SHARE,
@@ -28,10 +27,10 @@ from pathwalker_cli.studies.verdict import (
     StifferStops,
     StopVerdict,
     Verdict,
-    stop_warnings,
-    verdict_lines,
     verdict_of_metrics,
 )
+from pathwalker_cli.studies.verdict.judge import _nearest, _quadratic_edge, _stops, verdict_of
+from pathwalker_cli.studies.verdict.words import stop_warnings, verdict_lines
 
 INSIDE = NumberVerdict(
     "plantarflexion_stiffness_right", "K_P right", "N m/rad", 20.0,

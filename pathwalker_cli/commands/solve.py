@@ -113,7 +113,7 @@ def _report(outcome: Outcome, folder: Path) -> None:
         spring_notes,
         summary_rows,
     )
-    from pathwalker_cli.studies.verdict import verdict_lines
+    from pathwalker_cli.studies.verdict.words import verdict_lines
 
     solution, metrics, verdict = outcome
     if solution.config.smoke:

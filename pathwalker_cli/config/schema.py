@@ -256,7 +256,7 @@ class MeshConfig(YamlModel):
     intervals: (
         Annotated[int, Field(ge=8, le=1000)]
         | Annotated[tuple[Annotated[int, Field(ge=1, le=200)], ...], AS_TUPLE]
-    ) = 48
+    ) = 64
     least_intervals_per_phase: Annotated[int, Field(ge=1, le=50)] = 2
     position_tolerance: Annotated[float, Quantity("rad or m", 1e-8, 1.0)] = 1e-3
     velocity_tolerance: Annotated[float, Quantity("rad/s or m/s", 1e-8, 10.0)] = 1e-2

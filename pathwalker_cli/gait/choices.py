@@ -74,13 +74,15 @@ BARRIER_SHARE: Final = 1e-2
 """Barrier, as a share of the tolerance of the stage before, that a warm start begins with."""
 
 # Mesh.
-MESHING_TOLERANCE: Final = 1e-6
-"""Relative tolerance of the integrator that a mesh is refined by; errors to find are 1e-3."""
-EAGER_ROUND: Final = 4
+MESHING_TOLERANCE: Final = 1e-4
+PROVING_TOLERANCE: Final = 1e-7
+"""Relative tolerances of the integrator that a mesh is refined by, where errors of 1e-3 are to be
+found within some per cent, and of the one that has the last word."""
+EAGER_ROUND: Final = 2
 EAGER_SHARE: Final = 0.3
 """Round from which intervals are split at a share of the tolerance already: the solution moves
 from round to round, and would take the error to another interval that just met it before."""
-COST_AIM: Final = 0.5
+COST_AIM: Final = 0.3
 """Share of the cost's tolerance that intervals which are not split may change it by."""
 AIM: Final = 2.0
 MOST_PARTS: Final = 4

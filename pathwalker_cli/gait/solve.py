@@ -369,9 +369,11 @@ class GaitSolver:
                 break
             errors = self._errors(program, result, choices.MESHING_TOLERANCE)
             costly = self._costly(program, result)
-            settled = not any(part.any() for part in costly)
-            if settled and _within(errors, mesh) and tolerance <= solver.tolerance:
-                break
+            settled = tolerance <= solver.tolerance and not any(part.any() for part in costly)
+            if settled and _within(errors, mesh):
+                errors = self._errors(program, result)
+                if _within(errors, mesh):
+                    return program, result, errors
             share = choices.EAGER_SHARE if attempt >= choices.EAGER_ROUND else 1.0
             meshes = meshing.refined(program.meshes, errors, costly, mesh, share)
             start = program.to_motion(result.unknowns).resampled(meshes, mesh.degree)
@@ -392,7 +394,10 @@ class GaitSolver:
         return self.stage(f"{name} again", start, self.prediction, far)
 
     def _errors(
-        self, program: CollocationProgram, result: NlpResult, tolerance: float = 1e-9
+        self,
+        program: CollocationProgram,
+        result: NlpResult,
+        tolerance: float = choices.PROVING_TOLERANCE,
     ) -> Reintegration:
         """Return the errors of an independent integrator of this relative tolerance."""
         began = time.perf_counter()

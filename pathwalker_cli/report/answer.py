@@ -15,7 +15,7 @@ from pathwalker_cli.report.springs import left_open, prescribed, recommended
 from pathwalker_cli.report.summaries import SensitivitySummary, UncertaintySummary
 from pathwalker_cli.results.text import interesting
 from pathwalker_cli.studies.sensitivity.result import SHOWN, label_of
-from pathwalker_cli.studies.verdict import stop_warnings
+from pathwalker_cli.studies.verdict.words import stop_warnings
 
 _KINDS = {
     "dorsiflexion": "the spring against the shin leaning forward (K_D)",

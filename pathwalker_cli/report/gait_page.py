@@ -16,7 +16,7 @@ from pathwalker_cli.report.springs import spring_section
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import expanded, measures_in
-from pathwalker_cli.studies.verdict import snapped_warning, stop_warnings
+from pathwalker_cli.studies.verdict.words import snapped_warning, stop_warnings
 
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:

@@ -8,12 +8,9 @@ from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.report.content import Fact, Row, Section, Table
 from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.stride.measures import measure_of
-from pathwalker_cli.studies.verdict import (
-    NOT_DETERMINED,
+from pathwalker_cli.studies.verdict import NOT_DETERMINED, SHARE, NumberVerdict, Verdict
+from pathwalker_cli.studies.verdict.words import (
     PRESCRIBED,
-    SHARE,
-    NumberVerdict,
-    Verdict,
     number_text,
     per_degree,
     reservations,

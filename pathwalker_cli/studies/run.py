@@ -23,8 +23,9 @@ from pathwalker_cli.results.run_folder import (
     warm_start_run,
     write_run,
 )
-from pathwalker_cli.studies.judge import verdict_of
-from pathwalker_cli.studies.verdict import Verdict, verdict_lines
+from pathwalker_cli.studies.verdict import Verdict
+from pathwalker_cli.studies.verdict.judge import verdict_of
+from pathwalker_cli.studies.verdict.words import verdict_lines
 
 SAME_RUN: Final = "earlier run of the same problem"
 """Start of a solve that begins at the optimum that it is to find."""

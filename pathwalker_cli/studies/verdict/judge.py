@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -32,6 +32,7 @@ from pathwalker_cli.studies.verdict import (
     StopVerdict,
     Verdict,
 )
+from pathwalker_cli.studies.verdict.edges import Edge, find_edge
 
 _CANDIDATES: Final = 2
 """Real springs next to an identified stiffness that are considered."""
@@ -271,122 +272,3 @@ def _stops(series: GaitSeries) -> Iterator[StopVerdict]:
                 float(weights @ on_stop) / whole if whole else 0.0,
                 float(stop.stiffness),
             )
-
-
-_SOLVES: Final = 8
-"""Most solves spent on one edge."""
-
-_NEAR: Final = 0.1
-"""Share of the allowed rise by which the cost at an edge may miss it."""
-
-_STRETCH: Final = 1.3
-"""Multiple of a step up to which the limit of the range is tried at once."""
-
-Solve = Callable[[float, Optimum, bool], Optimum]
-"""Solves with the number prescribed, from a neighbour; whether to insist."""
-
-
-@dataclass(frozen=True)
-class Edge:
-    """Where the cost has risen as far as allowed.
-
-    Args:
-        value: The number [its unit].
-        limit: Whether it is the limit of the range, with less than the allowed rise there.
-        rise: Rise of the cost there, as a share.
-        certain: Whether solves enclose it; otherwise it is the last one that was solved.
-        again: Whether the cost is good again at the limit of the range: another local optimum.
-        solves: Number of solves.
-        iterations: Their iterations.
-    """
-
-    value: float
-    limit: bool
-    rise: float
-    certain: bool
-    solves: int
-    iterations: int
-    again: bool = False
-
-
-@dataclass
-class _Search:
-    """A search in one direction: the last point inside, and the first one outside if known."""
-
-    inside: Optimum
-    at: float
-    rise: float = 0.0
-    outside: float | None = None
-    outside_rise: float = 0.0
-    solves: int = 0
-    iterations: int = 0
-
-
-def find_edge(
-    solve: Solve,
-    optimum: Optimum,
-    start: float,
-    limit: float,
-    share: float,
-    step: float,
-    look: bool = True,
-) -> Edge:
-    """Return where the cost has risen by a share, or the limit of the range.
-
-    Args:
-        solve: Solves with the number prescribed; the others follow.
-        optimum: The optimum.
-        start: Its value there.
-        limit: The end of the range in the direction of the search.
-        share: Allowed rise of the cost relative to its size, e.g. 0.05.
-        step: Expected distance to the edge, positive.
-        look: Whether to look at the limit for another optimum, where the edge lies before it.
-    """
-    search = _Search(optimum, start)
-    sign, size = (1.0 if limit > start else -1.0), abs(optimum.cost)
-    while search.solves < _SOLVES and search.at != limit:
-        if search.outside is None:
-            trial = search.at + sign * step
-            if abs(limit - search.at) <= _STRETCH * step:
-                trial = limit
-        else:
-            trial = _between(search, share)
-        end = solve(trial, search.inside, True)
-        search.solves += 1
-        search.iterations += end.result.iterations
-        if not end.converged:
-            step = abs(trial - search.at) / 2.0
-            search.outside = None
-            continue
-        rise = (end.cost - optimum.cost) / size
-        if rise <= share * (1.0 + _NEAR):
-            search.inside, search.at, search.rise = end, trial, rise
-            step = max(step, 2.0 * abs(trial - start))
-        else:
-            search.outside, search.outside_rise = trial, rise
-        if abs(rise - share) <= _NEAR * share and trial != limit:
-            edge = Edge(trial, False, rise, True, search.solves, search.iterations)
-            return (
-                _looked_beyond(edge, solve, optimum, search.inside, limit, share) if look else edge
-            )
-    limited = search.at == limit
-    return Edge(search.at, limited, search.rise, limited, search.solves, search.iterations)
-
-
-def _looked_beyond(
-    edge: Edge, solve: Solve, optimum: Optimum, inside: Optimum, limit: float, share: float
-) -> Edge:
-    """Return an edge inside the range, after one look at the limit."""
-    end = solve(limit, inside, False)
-    again = end.converged and end.cost - optimum.cost <= share * abs(optimum.cost)
-    iterations = edge.iterations + end.result.iterations
-    return replace(edge, again=again, solves=edge.solves + 1, iterations=iterations)
-
-
-def _between(search: _Search, share: float) -> float:
-    """Return where the cost should meet the share, between the points inside and outside."""
-    assert search.outside is not None  # noqa: S101 - called once a point outside is known
-    part = (share - search.rise) / (search.outside_rise - search.rise)
-    # the cost is convex near its optimum: the true edge lies beyond the secant's
-    part = min(max(part**0.5 if search.rise <= 0.0 else part, 0.1), 0.9)
-    return search.at + part * (search.outside - search.at)
