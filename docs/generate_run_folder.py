@@ -122,6 +122,7 @@ PROOF: Final = {
     "largest_violation_name": "which that is",
     "violations": "the largest ones, name and amount",
     "cost_error": "estimated change of the cost if all mesh intervals were halved; null where the mesh is too coarse to tell",
+    "measure_errors": "the same of every measure that is one number, to first order, free numbers held [SI units]; empty where the cost's is null",
     "reintegration_position_error": "largest error of an independent integrator at the next node [rad, m]",
     "reintegration_velocity_error": "the same for velocities [rad/s, m/s]",
     "second_engine_residual": "largest violation of the equation of motion in numeric Pinocchio [N, N m]",

@@ -26,7 +26,6 @@ from pathwalker_cli.gait.solution import GaitSolution, StageRecord
 from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
 from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.problems import PROBLEMS
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.verify import Reintegration
 
@@ -177,7 +176,7 @@ def made_runs(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFact
     """Return a folder with a barefoot run and one with orthoses, to be read or copied."""
     folder = tmp_path_factory.mktemp("made")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
+        patch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
         for problem in ("mapd-barefoot", "mapd-orthosis"):
             write_run(folder / problem, made_solution(problem))
     return folder

@@ -9,7 +9,6 @@ import pytest
 
 from conftest import MadeSolution
 from pathwalker_cli.conventions import STIFFNESSES
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies.verdict import NumberVerdict, SnappedSprings, StopVerdict, Verdict
 
@@ -59,6 +58,6 @@ def write_made_run(folder: Path, made: MadeSolution, problem: str, **changes: An
     if problem == "mapd-orthosis":
         more["verdict"] = made_verdict().as_dict()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
+        patch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
         write_run(folder, made(problem, **changes), more=more)
     return folder

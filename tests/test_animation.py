@@ -35,7 +35,6 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.conventions import GENERATORS, SIDES, SUFFIX
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.model.contact import PHASES, phase_named
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.stride import body_points
 
@@ -61,7 +60,7 @@ def runs(made_solution: MadeSolution, tmp_path_factory: pytest.TempPathFactory) 
     """Return a folder of runs, named after their problems; `broken` did not converge."""
     folder = tmp_path_factory.mktemp("runs")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
+        patch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
         for problem in ("mapd-barefoot", "mapd-orthosis", "mapd-healthy"):
             write_run(folder / problem, made_solution(problem))
         write_run(folder / "broken", made_solution("mapd-barefoot", status="iteration limit"))

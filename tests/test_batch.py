@@ -32,7 +32,6 @@ from pathwalker_cli.io import processes
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.yaml_file import read_mapping
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.studies.batch import ledger, worker
 from pathwalker_cli.studies.batch.cases import BatchCase, load_cases
@@ -512,7 +511,7 @@ def made(made_solution: MadeSolution) -> Work:
 @pytest.fixture
 def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave figures out of run folders."""
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
 
 
 @pytest.mark.usefixtures("no_figures")

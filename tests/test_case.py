@@ -20,7 +20,6 @@ from pathwalker_cli.errors import ConfigError, DataError, PatientError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.io.recordings import read_recording, recording_names
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.studies import run as study_run
 from report_runs import write_made_run
@@ -88,7 +87,7 @@ def test_the_base_of_a_study_is_read_once_too(
         return made_solution(case.config.problem, case=case, status="the iterates diverged")
 
     monkeypatch.setattr(study_run, "_solve", solved)
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
     command = "perturb" if study == "perturbation" else study
     base = ("--set", f"base={child / 'mapd-orthosis.yaml'}", "--out", str(child / "out"))
     found = opened(child, command, study, *base)

@@ -70,8 +70,8 @@ def test_a_prediction_is_told_in_full(here: Path) -> None:
 
 def test_size_is_that_of_the_first_mesh() -> None:
     content = check_file("mapd-orthosis").content
-    assert content["intervals"] == 52
-    assert content["unknowns"] == 8465
+    assert content["intervals"] == 70
+    assert content["unknowns"] == 11369
     assert content["free_parameters"] == [
         f"{kind}_stiffness_{side}"
         for kind in ("dorsiflexion", "plantarflexion")
@@ -178,7 +178,7 @@ def test_json_tells_of_good_files_beside_those_that_are_refused(here: Path) -> N
     assert content["ok"] is False
     bad, good = content["configs"]
     assert bad == {"config": "nowhere.yaml", "ok": False, "error": sentence}
-    assert (good["config"], good["ok"], good["intervals"]) == ("mapd-barefoot", True, 52)
+    assert (good["config"], good["ok"], good["intervals"]) == ("mapd-barefoot", True, 70)
 
 
 # Overrides

@@ -30,7 +30,6 @@ from pathwalker_cli.model.urdf import urdf_text
 from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.violations import Violation
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import ENTRIES, load_run, write_run
 from pathwalker_cli.stride.measures import metrics_of
 from pathwalker_cli.stride.series import gait_series
@@ -298,7 +297,7 @@ def test_bad_words_get_one_sentence(here: Path, words: list[str], parts: tuple[s
 @pytest.fixture
 def made_run(here: Path, made_solution: MadeSolution, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return the folder of a run that is not the fruit of a solve; figures are left out."""
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
     write_run(here / "run", made_solution())
     return here / "run"
 
@@ -374,7 +373,7 @@ class _Solver:
 @pytest.fixture
 def ends(monkeypatch: pytest.MonkeyPatch, here: Path) -> Callable[[GaitSolution], None]:
     """Return a function that decides how the next solves end."""
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
     monkeypatch.setattr(study_run, "GaitSolver", _Solver)
     monkeypatch.setattr(study_run, "verdict_of", lambda solution: None)
 

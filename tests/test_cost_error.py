@@ -36,6 +36,20 @@ def test_the_estimate_is_about_what_halving_the_intervals_changes(intervals: int
     assert 1 / 3 < estimate.total / change < 3
 
 
+def test_the_step_leads_towards_the_motion_on_the_finer_mesh() -> None:
+    program, result = solved(3)
+    fine, there = solved(6)
+    estimate = cost_error(program, result)
+    assert estimate is not None
+    here = program.to_motion(result.unknowns).resampled(fine.meshes, 3)
+    before, after = (
+        np.abs(fine.to_unknowns(motion) - there.unknowns).max()
+        for motion in (here, estimate.motion)
+    )
+    assert before > 1e-3
+    assert after < 0.3 * before
+
+
 def test_the_shares_point_to_where_the_force_is_not_smooth() -> None:
     estimate = cost_error(*solved(6))
     assert estimate is not None

@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from pathwalker_cli.gait.resolve import Optimum
-from pathwalker_cli.studies.verdict.judge import Edge, find_edge
+from pathwalker_cli.studies.verdict.edges import Edge, find_edge
 
 
 def point(cost: float, converged: bool = True) -> Optimum:

@@ -17,7 +17,6 @@ from pathwalker_cli.evaluation import figures
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
 
 MadeSolution = Callable[..., GaitSolution]
@@ -42,7 +41,7 @@ def refusal(*words: object) -> str:
 @pytest.fixture
 def runs(made_runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Path]:
     """Return the folders of both runs by problem, copies that may be changed; work beside them."""
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
     monkeypatch.chdir(tmp_path)
     shutil.copytree(made_runs, tmp_path / "made")
     return {folder.name: folder for folder in (tmp_path / "made").iterdir()}

@@ -23,7 +23,6 @@ from pathwalker_cli.export.files import write_export
 from pathwalker_cli.model.contact import Feet
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import body_points
@@ -99,7 +98,7 @@ def test_opensim_finds_our_torques_and_accelerations(
 def test_opensim_finds_the_torques_of_shipped_problems(
     config: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
     run, out = str(tmp_path / "run"), tmp_path / "out"
     for words in (
         ["solve", load_config(config).problem, config, "--out", run, "--set", "verdict=false"],
@@ -302,7 +301,7 @@ def test_points_move_with_the_walker(made_runs: Path, tmp_path: Path) -> None:
 def test_what_is_no_solution_or_no_folder_is_refused(
     made_runs: Path, made_solution: MadeSolution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
     write_run(tmp_path / "failed", made_solution("mapd-barefoot", status="iteration limit"))
     (tmp_path / "file").touch()
     for run, out, said in (

@@ -46,7 +46,7 @@ written; the last is a call of the system."""
 
 @pytest.fixture(autouse=True)
 def _no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
 
 
 def killed_at_every_step(act: Callable[[], Any], look: Callable[[], Any]) -> int:

@@ -32,7 +32,6 @@ from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.problems import PROBLEMS
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.studies import run as study_run
 from pathwalker_cli.studies.batch import cases, study
 from pathwalker_cli.studies.batch.ledger import Ended
@@ -241,7 +240,7 @@ def solve(
     monkeypatch: pytest.MonkeyPatch, here: Path, made_solution: MadeSolution
 ) -> Callable[..., Result]:
     """Return a function that runs `solve --json` with a made end."""
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
     monkeypatch.setattr(study_run, "GaitSolver", _Solver)
     monkeypatch.setattr(study_run, "verdict_of", lambda solution: None)
 

@@ -29,7 +29,6 @@ from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.report.gait_page import gait_page
 from pathwalker_cli.report.html import page_html
 from pathwalker_cli.report.runs import read_runs
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.figures.save import make_figure
 from pathwalker_cli.stride.measures import metrics_of
@@ -225,7 +224,7 @@ def test_a_run_speaks_of_the_side_that_is_worn(solution: GaitSolution, tmp_path:
     assert verdict.snapped is None or all(n.endswith("left") for n in verdict.snapped.names)
     with pytest.MonkeyPatch.context() as patch:
         sketch(patch)
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
+        patch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
         write_run(tmp_path / "run", solution, more={"verdict": verdict.as_dict()})
     (run,) = runs = read_runs([tmp_path / "run"])
     assert run.verdict == verdict_of_metrics(run.run.metrics)

@@ -14,6 +14,7 @@ import pytest
 from matplotlib.figure import Figure
 from rich.console import Console
 
+from conftest import MadeSolution
 from figure_measure import complaints
 from helpers import ACTIVATION, FRICTION, GAIT, STIFFNESS, stylised_series
 from pathwalker_cli.conventions import CONTACT_FORCES, COORDINATES, GENERATORS, SIDES, STIFFNESSES
@@ -23,7 +24,13 @@ from pathwalker_cli.io.json_file import json_text, write_json
 from pathwalker_cli.io.trajectory_csv import read_trajectory
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.results.tables import TABLES, controls_table, forces_table, torques_table
-from pathwalker_cli.results.text import spring_notes, summary, summary_renderable, summary_rows
+from pathwalker_cli.results.text import (
+    _discretisation_text,
+    spring_notes,
+    summary,
+    summary_renderable,
+    summary_rows,
+)
 from pathwalker_cli.stride.figures import (
     FIGURES,
     Band,
@@ -350,3 +357,18 @@ def test_summary(metrics: dict[str, Any]) -> None:
     ]
     barefoot = metrics_of(stride_of(stylised_series("barefoot")))
     assert "K_D" not in summary(summary_rows(barefoot, "converged"))
+
+
+def test_what_a_finer_mesh_changes_is_told_as_far_as_digits_show_it(
+    made_solution: MadeSolution,
+) -> None:
+    errors = {
+        "walking_speed": 4e-4,
+        "min_stance_knee_flexion_left": 2e-3,
+        "step_length_right": None,
+    }
+    text = _discretisation_text(made_solution(), errors)
+    assert text == (
+        "halving all mesh intervals would change the cost by about -0.2 %, "
+        "least stance knee flexion, left by +0.11 deg"
+    )

@@ -28,7 +28,6 @@ from pathwalker_cli.reproduce.figures import save_paper_figures
 from pathwalker_cli.reproduce.pipeline import ORDER, SEVERAL, planned_studies
 from pathwalker_cli.reproduce.results import Results, evaluated, inverse_config, inverse_result
 from pathwalker_cli.reproduce.words import deviation, label, ours_text, printed, subject
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.studies import run as study_run
 
 MadeSolution = Callable[..., GaitSolution]
@@ -71,7 +70,7 @@ def _without_solves(made: MadeSolution) -> Iterator[Solver]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study_run, "_solve", stand_in)
         patch.setattr(study_run, "verdict_of", lambda solution: None)
-        patch.setattr(run_folder, "save_figures", lambda *_: ())
+        patch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
         patch.setattr(pipeline, "recordings", RECORDINGS)
         patch.setattr(pipeline, "save_paper_figures", lambda *_: (("figure-1.png", "Figure 1"),))
         yield stand_in

@@ -38,7 +38,7 @@ FIELDS = ("mesh", "states", "smooth", "controls", "integrals", "inner_states", "
 def _no_figures(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
     """Leave the figures out, which take most of the time, unless a test is about them."""
     if "figures" not in request.node.name:
-        monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+        monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
 
 
 @pytest.fixture

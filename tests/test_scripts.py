@@ -34,7 +34,6 @@ from pathwalker_cli.model import elements
 from pathwalker_cli.model.contact import USES
 from pathwalker_cli.model.elements import plain
 from pathwalker_cli.model.numbers import Number
-from pathwalker_cli.results import run_folder
 from pathwalker_cli.results.run_folder import load_run, write_run
 from pathwalker_cli.stride import measures
 from pathwalker_cli.stride.measure import Measure
@@ -170,7 +169,7 @@ def test_a_use_of_the_feet_is_solved_and_its_run_read_without_it(
     assert solution.converged
     names = solution.walker.pattern.names
     assert names[-2:] == ("left_toe_right_toe", "left_toe_right_flat")
-    monkeypatch.setattr(run_folder, "save_figures", lambda *_: ())
+    monkeypatch.setattr("pathwalker_cli.stride.figures.save.save_figures", lambda *_: ())
     write_run(tmp_path / "run", solution)
     del USES["toe_first"]
     run = load_run(tmp_path / "run")

@@ -144,6 +144,7 @@ class GaitSolution:
         reintegration: Errors of an independent integrator.
         cost_error: Estimated change of the cost if all mesh intervals were halved; None where it
             is not known.
+        finer_motion: The motion on that mesh to first order, for what else would change.
         start: Where the search began.
         seconds: Wall seconds by part: build, solve, verify.
         optima: Where all starts ended, best first; empty for a single start.
@@ -167,6 +168,7 @@ class GaitSolution:
     seconds: dict[str, float]
     optima: tuple[LocalOptimum, ...] = ()
     shortfall: Shortfall | None = None
+    finer_motion: PhasedMotion | None = None
 
     def __repr__(self) -> str:
         """Return what was solved, and how it ended."""

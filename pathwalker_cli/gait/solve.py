@@ -311,7 +311,9 @@ class GaitSolver:
 
     def whole_stride(self, program: CollocationProgram, result: NlpResult) -> PhasedMotion:
         """Return the motion of a whole stride, of half a cycle with its mirror image."""
-        motion = program.to_motion(result.unknowns)
+        return self._whole(program.to_motion(result.unknowns))
+
+    def _whole(self, motion: PhasedMotion) -> PhasedMotion:
         return full_stride(motion) if self.config.half_cycle else motion
 
     def _tracked_on_soles(self) -> PhasedMotion:
@@ -445,6 +447,7 @@ class GaitSolver:
             active=active_bounds(program, result),
             reintegration=errors,
             cost_error=None if error is None else error.total,
+            finer_motion=None if error is None else self._whole(error.motion),
             start=start,
             stages=tuple(self.stages),
             seconds=dict(self.seconds),

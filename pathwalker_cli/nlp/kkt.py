@@ -66,6 +66,23 @@ class Answer:
 
 
 @dataclass(frozen=True)
+class NewtonStep:
+    """A Newton step from a point near an optimum, not at it; free parameters stay.
+
+    Args:
+        unknowns: The point that it leads to, scaled, shape (n,).
+        by_unknowns: What every unknown adds to the change of the cost, shape (n,).
+        by_rows: What every row adds to it, shape (m,); the sum of all is the value of
+            L + r d / 2 less the cost, with the step d and the residuals r of the conditions of
+            optimality.
+    """
+
+    unknowns: np.ndarray
+    by_unknowns: np.ndarray
+    by_rows: np.ndarray
+
+
+@dataclass(frozen=True)
 class _Change:
     """What a number of the problem changes while unknowns and multipliers stay, per unit.
 
@@ -129,14 +146,8 @@ class KktSystem:
         return self._followed(answer, pull, list(range(len(self.free))))
 
     @cached_property
-    def step(self) -> tuple[np.ndarray, np.ndarray]:
-        """What a Newton step changes the cost by, from a point near an optimum, not at it.
-
-        Returns:
-            The shares of the unknowns (n,) and of the rows (m,); their sum is the value of
-            L + r d / 2 there less the cost, with the step d and the residuals r of the conditions
-            of optimality. Free parameters stay.
-        """
+    def step(self) -> NewtonStep:
+        """The Newton step from here, a point near an optimum."""
         multipliers = self.result.multipliers
         _, gradient, rows = self._own_first_order
         lower, upper = self.program.row_bounds
@@ -147,7 +158,11 @@ class KktSystem:
         change = _Change(0.0, residual, missed, np.zeros(len(residual)))
         answer = self._answer(change)
         along = multipliers.rows + answer.rows / 2.0
-        return residual * answer.unknowns / 2.0, missed * along
+        return NewtonStep(
+            self.result.unknowns + answer.unknowns,
+            residual * answer.unknowns / 2.0,
+            missed * along,
+        )
 
     @cached_property
     def parameter_answers(self) -> tuple[Answer, ...]:

@@ -1,4 +1,4 @@
-"""What the mesh does to the cost: a Newton step on a mesh of halved intervals, none is solved.
+"""What the mesh does to cost and motion: a Newton step on halved intervals, none is solved.
 
 The optimum on a mesh, carried to one of halved intervals, misses the conditions of optimality:
 between its nodes it does not follow the dynamics, and controls could bend where they are straight.
@@ -21,6 +21,7 @@ from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.nlp.kkt import KktSystem
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.multipliers import transferred
+from pathwalker_cli.ocp.phased import PhasedMotion
 
 
 @dataclass(frozen=True)
@@ -30,10 +31,12 @@ class CostError:
     Args:
         total: The change; negative where a finer mesh costs less.
         shares: What every interval adds to it, one array for each phase, shape (N,).
+        motion: The motion on that mesh to first order; the parameters stay.
     """
 
     total: float
     shares: tuple[np.ndarray, ...]
+    motion: PhasedMotion
 
 
 _TRUSTED: Final = 0.1
@@ -53,18 +56,19 @@ def cost_error(program: CollocationProgram, result: NlpResult) -> CostError | No
     _, rows = fine.functions["nlp"](unknowns, fine.parameters)
     point: dict[str, Any] = {"unknowns": unknowns, "rows": np.asarray(rows).ravel()}
     point["multipliers"] = transferred(program, result.multipliers, fine)
-    shares = KktSystem(fine, replace(result, **point)).step
+    step = KktSystem(fine, replace(result, **point)).step
+    shares = np.concatenate([step.by_unknowns, step.by_rows])
     intervals = [len(mesh) - 1 for mesh in program.meshes]
     groups = np.concatenate([keys[:, 0] for keys in fine.elimination_keys])
     # two halves of an interval, each with a group for every point, one for its end and its node
     of = groups // (2 * (program.blocks.degree + 2))
-    total = float(sum(part.sum() for part in shares))
+    total = float(shares.sum())
     if not abs(total) <= _TRUSTED * abs(result.objective):
         return None
-    gained = np.bincount(of, np.concatenate(shares), minlength=sum(intervals))
+    gained = np.bincount(of, shares, minlength=sum(intervals))
     # what ties the ends together belongs to no interval
     each = np.split(gained[: sum(intervals)], np.cumsum(intervals)[:-1])
-    return CostError(total, tuple(each))
+    return CostError(total, tuple(each), fine.to_motion(step.unknowns))
 
 
 def _halved(mesh: np.ndarray) -> np.ndarray:

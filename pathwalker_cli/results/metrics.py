@@ -20,7 +20,8 @@ from pathwalker_cli.io.json_file import json_text
 from pathwalker_cli.nlp.kernels import kernels_level
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.stride.balance import balance
-from pathwalker_cli.stride.measures import metrics_of
+from pathwalker_cli.stride.measures import metrics_of, numbers_of
+from pathwalker_cli.stride.series import gait_series
 from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.versions import today, versions
 
@@ -62,6 +63,7 @@ class RunMetrics(BaseModel):
     reintegration_position_error: Number = None
     reintegration_velocity_error: Number = None
     cost_error: Number = None
+    measure_errors: dict[str, Number] = {}
     second_engine_residual: Number = None
     balance: dict[str, Number] = {}
     shortfall: dict[str, Any] | None = None
@@ -202,6 +204,7 @@ def _proof(solution: GaitSolution) -> dict[str, Any]:
         "reintegration_position_error": errors.worst_position,
         "reintegration_velocity_error": errors.worst_velocity,
         "cost_error": solution.cost_error,
+        "measure_errors": _measure_errors(solution),
         "second_engine_residual": solution.second_engine,
         "balance": asdict(balance(solution.last_iterate)),
         "shortfall": None if solution.shortfall is None else solution.shortfall.as_dict(),
@@ -212,6 +215,16 @@ def _proof(solution: GaitSolution) -> dict[str, Any]:
         "bound_sources": solution.bounds.sources,
         "notes": solution.walker.patient.notes,
     }
+
+
+def _measure_errors(solution: GaitSolution) -> dict[str, float]:
+    """Return what halving all mesh intervals would change measures by, estimated [SI]."""
+    if solution.finer_motion is None:
+        return {}
+    own = numbers_of(stride_of(solution.last_iterate))
+    finer = numbers_of(stride_of(gait_series(solution.walker, solution.finer_motion)))
+    same = STIFFNESSES  # free numbers stay in the estimate
+    return {key: finer[key] - own[key] for key in own if key in finer and key not in same}
 
 
 def _origin(solution: GaitSolution, inputs: RunInputs) -> dict[str, Any]:

@@ -27,7 +27,6 @@ from pathwalker_cli.gait.motion_file import (
 )
 from pathwalker_cli.gait.recorded import start_recording
 from pathwalker_cli.gait.solution import GaitSolution
-from pathwalker_cli.inverse.figures import recorded_reference
 from pathwalker_cli.io.atomic import check_room, swapped, sweep
 from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.lock import locked
@@ -46,7 +45,6 @@ from pathwalker_cli.results.metrics import (
 )
 from pathwalker_cli.results.tables import TABLES
 from pathwalker_cli.results.text import shortfall_text
-from pathwalker_cli.stride.figures.save import FORMATS, save_figures
 
 CONFIG: Final = "config.resolved.yaml"
 """The config of a run with every value written out."""
@@ -155,6 +153,10 @@ def _write_series(folder: Path, solution: GaitSolution) -> None:
     if wanted != "none" and all(
         np.isfinite(values).all() for values in (series.q, series.force, series.net_torque)
     ):
+        # Matplotlib takes half a second to load, which a run without figures need not wait for
+        from pathwalker_cli.inverse.figures import recorded_reference
+        from pathwalker_cli.stride.figures.save import FORMATS, save_figures
+
         reference = recorded_reference(series.walker.patient, series.walker.condition)
         formats = FORMATS if wanted == "all" else (wanted,)
         save_figures(series, folder / "figures", reference, formats)

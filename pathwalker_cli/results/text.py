@@ -203,7 +203,7 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
         ("clinical goals", ", ".join(f"{_words(n)} {v:.4g}" for n, v in metrics["goals"].items())),
         ("largest violation", f"{worst.amount:.1e} ({worst.name})"),
         ("re-integration error", again),
-        ("discretisation", _discretisation_text(solution)),
+        ("discretisation", _discretisation_text(solution, metrics["measure_errors"])),
         ("second engine", f"equations of motion met within {solution.second_engine:.1e} N or N m"),
         ("balances", _balance_text(metrics["balance"])),
         (
@@ -216,11 +216,27 @@ def detail_lines(solution: GaitSolution, metrics: Mapping[str, Any]) -> list[tup
     return [*rows, *(("active bound", line) for line in bound_lines(solution))]
 
 
-def _discretisation_text(solution: GaitSolution) -> str:
+_DISCRETISED: Final = (
+    "walking_speed",
+    "step_length_*",
+    "min_stance_knee_flexion_*",
+    "peak_vertical_force_*_body_weights",
+)
+"""Families of measures whose estimated errors stand in the terminal; files have those of all."""
+
+
+def _discretisation_text(solution: GaitSolution, errors: Mapping[str, float | None]) -> str:
+    """Return what a finer mesh would change, measures as far as their digits show it."""
     if solution.cost_error is None:
         return "not estimated: the mesh is too coarse to tell"
     share = 100.0 * solution.cost_error / abs(solution.cost)
-    return f"halving all mesh intervals would change the cost by about {share:+.2g} %"
+    changes = [f"the cost by about {share:+.2g} %"]
+    for key in (key for family in _DISCRETISED for key in expanded(family)):
+        measure, change = measure_of(key), errors.get(key)
+        text = measure.text(change, sign=True)
+        if change is not None and float(text):
+            changes.append(f"{measure.label} by {text} {measure.shown_unit}")
+    return f"halving all mesh intervals would change {', '.join(changes)}"
 
 
 def _balance_text(found: Mapping[str, float]) -> str:
