@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.errors import InputError, NotConvergedError, PathwalkerError
-from pathwalker_cli.explore.page import explore_page
-from pathwalker_cli.explore.picture import picture
+from pathwalker_cli.explore.page import explore_page, picture
 from pathwalker_cli.explore.session import STOPPED, Session
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.processes import prepare_worker
