@@ -43,31 +43,31 @@ from pathwalker_cli.studies.batch.schema import BatchStudy
 from pathwalker_cli.studies.registry import STUDIES
 
 
-def check_kinematics(path: str, changes: Changes = ()) -> Checked:
-    """Return what `ik` would do."""
-    config = load_inverse_kinematics(path, changes)
+def _check_recorded(
+    kind: str,
+    load: Callable[[str, Changes], InverseKinematicsConfig | InverseDynamicsConfig],
+    path: str,
+    changes: Changes = (),
+) -> Checked:
+    """Return what `ik` or `id` would do."""
+    config = load(path, changes)
     with placed(path):
         patient = load_patient(config.patient)
-        trials = _c3d(config, patient)
-    return _recorded_study(path, "inverse kinematics", patient, trials, "C3D files")
-
-
-def check_dynamics(path: str, changes: Changes = ()) -> Checked:
-    """Return what `id` would do."""
-    config = load_inverse_dynamics(path, changes)
-    with placed(path):
-        patient = load_patient(config.patient)
-        require_trials(config, patient)
-        if config.source == "c3d":
+        where = "C3D files"
+        if isinstance(config, InverseDynamicsConfig):
+            require_trials(config, patient)
+            where = "C3D files" if config.source == "c3d" else "recordings beside the patient"
+        if where == "C3D files":
             trials = _c3d(config, patient)
-            return _recorded_study(path, "inverse dynamics", patient, trials, "C3D files")
-        trials = {c: list(recording_names(patient, c)) for c in config.conditions}
-        for condition in config.conditions:
-            for name in trials[condition]:
-                read_recording(patient, condition, name)
-    return _recorded_study(
-        path, "inverse dynamics", patient, trials, "recordings beside the patient"
-    )
+        else:
+            trials = {c: list(recording_names(patient, c)) for c in config.conditions}
+            for condition in config.conditions:
+                for name in trials[condition]:
+                    read_recording(patient, condition, name)
+    rows = [*patient_rows(patient)]
+    rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in trials.items() if n]
+    content: dict[str, Any] = {"patient": patient_content(patient), "trials": trials}
+    return Checked(path, kind, tuple(rows), content, patient_remarks(patient))
 
 
 def check_markers(path: str, changes: Changes = ()) -> Checked:
@@ -141,15 +141,6 @@ def _c3d(config: RecordedConfig, patient: Patient) -> dict[str, list[str]]:
     return trials
 
 
-def _recorded_study(
-    path: str, kind: str, patient: Patient, trials: dict[str, list[str]], where: str
-) -> Checked:
-    rows = [*patient_rows(patient)]
-    rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in trials.items() if n]
-    content: dict[str, Any] = {"patient": patient_content(patient), "trials": trials}
-    return Checked(path, kind, tuple(rows), content, patient_remarks(patient))
-
-
 Check = Callable[[str, Changes], Checked]
 
 
@@ -168,8 +159,16 @@ KINDS: Final[dict[str, Kind]] = {
         for command, entry in STUDIES.items()
     },
     "cohort": Kind(BatchStudy, check_batch, "pathwalker batch"),
-    "inverse-kinematics": Kind(InverseKinematicsConfig, check_kinematics, "pathwalker ik"),
-    "inverse-dynamics": Kind(InverseDynamicsConfig, check_dynamics, "pathwalker id"),
+    "inverse-kinematics": Kind(
+        InverseKinematicsConfig,
+        partial(_check_recorded, "inverse kinematics", load_inverse_kinematics),
+        "pathwalker ik",
+    ),
+    "inverse-dynamics": Kind(
+        InverseDynamicsConfig,
+        partial(_check_recorded, "inverse dynamics", load_inverse_dynamics),
+        "pathwalker id",
+    ),
     "markers": Kind(
         MarkerSet,
         check_markers,

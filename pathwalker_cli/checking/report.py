@@ -17,14 +17,9 @@ Changes = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Checked:
-    """A file that is in order.
+    """A file that is in order: all there is to know, as rows and as plain values.
 
-    Args:
-        path: The file.
-        kind: What it is, e.g. "prediction" or "landscape".
-        rows: Label and text of everything there is to know.
-        content: The same as plain values.
-        notes: What may be meant but is unusual, a sentence each.
+    `notes` says what may be meant but is unusual, a sentence each.
     """
 
     path: str

@@ -41,14 +41,7 @@ tolerance of its own, which may move springs that the cost does not determine.""
 
 @dataclass(frozen=True)
 class Study:
-    """A study around an optimum.
-
-    Args:
-        folder: Its folder.
-        kind: Which command made it.
-        content: Its summary.
-        summary: The same, typed: a member of `SUMMARIES`.
-    """
+    """A study around an optimum: its folder, its command, its summary, and the same as a type."""
 
     folder: Path
     kind: Kind

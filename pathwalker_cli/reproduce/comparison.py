@@ -80,13 +80,7 @@ _NOT_COMPUTED: Final[Reasons] = (
 
 @dataclass(frozen=True)
 class Ours:
-    """Our number, SI units: a value, or a range with its mean.
-
-    Args:
-        value: The value; of a range, its mean.
-        low: Lower end of a range, or None.
-        high: Upper end of a range, or None.
-    """
+    """Our number, SI units: a value, or a range with its mean."""
 
     value: float
     low: float | None = None
@@ -95,13 +89,9 @@ class Ours:
 
 @dataclass(frozen=True)
 class Row:
-    """One number of the article and ours.
+    """One number of the article and ours, or why there is none, and why the two differ.
 
-    Args:
-        number: What the article prints.
-        ours: Our number, or why there is none.
-        method: Method of inverse dynamics that gave it, "" for anything else.
-        why: Why the two differ, as far as it is known.
+    `method` is that of inverse dynamics, "" for anything else.
     """
 
     number: PaperNumber

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, Final
 
-from pathwalker_cli.conventions import COORDINATES, STIFFNESSES
 from pathwalker_cli.evaluation.evaluate import Change
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperClaim, PaperNumber
 from pathwalker_cli.reproduce.comparison import Row, all_rows
@@ -21,6 +20,7 @@ from pathwalker_cli.reproduce.words import (
     subject,
     table,
 )
+from pathwalker_cli.results.text import interesting
 
 _HEAD: Final = (
     "Results of `pathwalker reproduce` beside those of Sreenivasa M, Millard M, Felis M, Mombaur "
@@ -172,10 +172,6 @@ def _change_lines(changes: Sequence[Change]) -> Iterator[str]:
 
 Metrics = Mapping[str, Any]
 
-_SHAPING: Final = frozenset({*COORDINATES[2:], *STIFFNESSES, "duration", "walking_speed",
-                             "distance"})  # fmt: skip
-"""Bounds that are choices which shape a gait: joint range, duration, speed, springs."""
-
 
 def _pair(form: str, *keys: str) -> Callable[[Metrics], str]:
     """Return what shows two metrics side by side."""
@@ -215,7 +211,7 @@ _GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
 
 def _shaping_bounds(result: ProblemResult) -> list[str]:
     """Return the active bounds that are choices which shape the gait."""
-    return [str(bound) for bound in result.bounds if bound.name in _SHAPING]
+    return [str(bound) for bound in result.bounds if interesting(bound)]
 
 
 def problem_lines(results: Results) -> Iterator[str]:

@@ -119,16 +119,9 @@ def _read(file: Path, key: dict[str, Any]) -> InverseResult | None:
 
 @dataclass(frozen=True)
 class ProblemResult:
-    """How a problem ended.
+    """How a problem ended; without series and evaluation if it did not converge.
 
-    Args:
-        problem: Its name.
-        metrics: Content of `metrics.json`.
-        bounds: Bounds that hold the solution back.
-        config: The config that was solved.
-        kept: Whether it was solved before and not again.
-        series: The stride, None if it did not converge.
-        evaluation: The stride beside the recordings, None if it did not converge.
+    `kept` says whether it was solved before and not again.
     """
 
     problem: str
@@ -147,14 +140,7 @@ class ProblemResult:
 
 @dataclass(frozen=True)
 class Results:
-    """Everything that was computed.
-
-    Args:
-        problems: The problems by name, in order.
-        inverse: By method of inverse dynamics, its result, or why there is none.
-        recorded: The recordings by condition.
-        quick: Whether the solves were quick checks on coarse meshes.
-    """
+    """Everything that was computed: in place of an inverse dynamics result, why there is none."""
 
     problems: Mapping[str, ProblemResult]
     inverse: Mapping[str, InverseResult | str]

@@ -105,10 +105,8 @@ class RunMetrics(BaseModel):
 class RunInputs:
     """What a run was made from, taken before the solve: an earlier run may change meanwhile.
 
-    Args:
-        hashes: SHA-256 of the resolved config, of the patient's file, of what is kept of the
-            patient, and of an earlier motion.
-        warm_start: Run that it began with; "" without one.
+    SHA-256 of the resolved config, of the patient's file, of what is kept of the patient, and of
+    the motion of the run that it began with, if there is one.
     """
 
     hashes: Mapping[str, str]

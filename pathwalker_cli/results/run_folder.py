@@ -65,14 +65,9 @@ ENTRIES: Final = frozenset(
 
 @dataclass(frozen=True)
 class Run:
-    """A run as it was read back.
+    """A run as it was read back: metrics, the exact motion, and the case that the folder keeps.
 
-    Args:
-        folder: Where it stands.
-        metrics: Content of `metrics.json`, by key.
-        motion: The exact motion.
-        case: The config with all defaults filled in, and the patient that the folder keeps.
-        multipliers: Multipliers of the solution by collocation; None if they were not kept.
+    Multipliers are those of a solution by collocation; None if they were not kept.
     """
 
     folder: Path

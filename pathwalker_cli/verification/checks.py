@@ -40,15 +40,7 @@ _SHOOTING: Final = "solved by multiple shooting: its run folder holds a descript
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was checked.
-
-    Args:
-        name: What.
-        value: What was found; None where it does not apply.
-        limit: What is allowed.
-        unit: Unit of both, "" for a count.
-        note: What differs, or why it does not apply.
-    """
+    """One thing that was checked; without a value it does not apply, and the note says why."""
 
     name: str
     value: float | None
@@ -64,14 +56,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of a run, or of the table of a study.
-
-    Args:
-        folder: Its folder.
-        problem: Its problem, or what it is.
-        patient: Id of its patient; "" if there are several.
-        checks: The checks.
-    """
+    """All checks of a run, or of the table of a study, which has no patient."""
 
     folder: Path
     problem: str

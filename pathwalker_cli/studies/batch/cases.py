@@ -34,15 +34,9 @@ _QUIET: Final = {"figures": "none"}
 
 @dataclass(frozen=True)
 class BatchCase:
-    """One patient in one problem with its overrides.
+    """One patient in one problem with its overrides; its run folder has its name.
 
-    Args:
-        name: Its name, and that of its run folder.
-        problem: Name of the problem in the study.
-        study: What is solved, and for whom.
-        values: What the grid varies, by dotted key.
-        variant: Name of the overrides that belong together; "" without.
-        warm_start: Run to begin with.
+    `values` is what the grid varies, by dotted key; `variant` names overrides that belong together.
     """
 
     name: str

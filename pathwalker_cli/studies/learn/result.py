@@ -59,20 +59,8 @@ class LeftOut:
 class LearnResult:
     """A set of learnt numbers beside the recordings that it comes from.
 
-    Args:
-        problem: The problem whose numbers they are.
-        learnt: The numbers.
-        stride: The stride that they predict.
-        recorded: The recordings.
-        targets: What the stride was held against.
-        misfits: What was minimised, by start.
-        prior_misfit: What of it is distance from the priors.
-        active: Ranges that hold the result; none should.
-        left_out: Leave-one-trial-out errors; None with a single trial.
-        solves: Predictions that were solved.
-        iterations: Iterations of all of them.
-        seconds: Wall seconds after the first prediction.
-        cpu_seconds: CPU seconds of this process after the first prediction.
+    `misfits` is what was minimised, by start; of it, `prior_misfit` is distance from the priors.
+    `active` ranges hold the result; none should. Seconds count after the first prediction.
     """
 
     problem: str

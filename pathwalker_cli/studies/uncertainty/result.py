@@ -54,17 +54,10 @@ class Uncertainty:
     """All draws and where they ended.
 
     Args:
-        config: The config of the base.
-        patient: Id of the patient.
-        intervals: Mesh intervals of all solves.
         base: Measures at the numbers of the file, SI units.
         ranges: Allowed range by spring and further number [SI].
-        measures: What is measured, in order.
         further: SI units of the unknowns beside the springs, by name.
-        draws: What was drawn.
-        solved: How each draw ended, in order.
         seconds: Wall seconds in all, the solve of the base from nothing apart.
-        workers: Processes that solved.
     """
 
     config: StudyConfig
