@@ -120,7 +120,6 @@ def check_orthosis(path: str, changes: Changes = ()) -> Checked:
 
 
 def _require_none(changes: Changes, path: str) -> None:
-    """Refuse overrides of what is no config."""
     if changes:
         raise ConfigError(
             f"overrides keys of configs, and {path} is none",

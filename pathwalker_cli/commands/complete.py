@@ -90,7 +90,6 @@ def _is_run(folder: Path) -> bool:
 
 
 def _is_reported(folder: Path) -> bool:
-    """Return whether a report can be made of a folder."""
     from pathwalker_cli.errors import DataError
     from pathwalker_cli.report.folders import folder_kind
 

@@ -161,7 +161,6 @@ class BatchProgress(Watch):
             self._bar.update(self._row, completed=self._ended, state=self._state())
 
     def _state(self) -> str:
-        """Return how many cases failed and run."""
         parts = [f"{self._failed} failed"] * bool(self._failed)
         if self._workers is not None:
             parts.append(f"{min(self._workers, self._total - self._ended)} running")

@@ -102,7 +102,6 @@ def _worn(case: Case) -> tuple[str, ...]:
 
 
 def _report(outcome: Outcome, folder: Path) -> None:
-    """Print the summary of a run."""
     from pathwalker_cli.results.metrics import stiffness_ranges
     from pathwalker_cli.results.text import (
         detail_lines,

@@ -120,7 +120,6 @@ def _springs(optimum: Optimum) -> Iterator[Dial]:
 
 
 def _device(optimum: Optimum) -> Iterator[Dial]:
-    """Yield the other numbers of the device."""
     device = optimum.walker.device
     if not device.worn:
         return
@@ -148,7 +147,6 @@ def _body(optimum: Optimum) -> Iterator[Dial]:
 
 
 def _wish(optimum: Optimum) -> Iterator[Dial]:
-    """Yield what is wanted of the walk."""
     config, group = optimum.config, "Wish"
     least = optimum.solver.bounds.table.entries[("walking_speed",)][0]
     yield Dial(_SPEED, group, "least walking speed", "m/s", None, 0.5 * least,

@@ -112,7 +112,6 @@ class Worker:
             _ = end.kkt.factors
 
     def _save(self, message: Message) -> None:
-        """Write what is shown as a run."""
         folder = self._places / message["name"]
         shown, (solution, _, _) = self._session.optimum.cost, self._session.save(folder)
         if not solution.converged:

@@ -157,7 +157,6 @@ def studies_near(
 
 
 def _study(folder: Path, kind: Kind) -> Study:
-    """Read the summary of a study."""
     path = folder / STUDIES[kind]
     content = read_json(path, mend="make the study again")
     model = SUMMARIES.get(kind, Summary)

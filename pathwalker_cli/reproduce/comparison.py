@@ -148,12 +148,10 @@ def _ours(number: PaperNumber, results: Results, spreads: Spreads) -> Ours | str
 
 
 def _known(value: float | None, why: str) -> Ours | str:
-    """Return a value, or why there is none."""
     return f"not computed: {why}" if value is None else Ours(float(value))
 
 
 def _inverse(number: PaperNumber, result: InverseResult, results: Results) -> Ours | str:
-    """Return what one method of inverse dynamics says."""
     known = partial(_known, why="inverse dynamics gives none")
     name = number.quantity.removeprefix("max_isometric_torque_").removeprefix("residual_")
     if number.subject == "patient":
@@ -175,7 +173,6 @@ def _inverse(number: PaperNumber, result: InverseResult, results: Results) -> Ou
 
 
 def _gait(number: PaperNumber, result: ProblemResult) -> Ours | str:
-    """Return a number of a solved problem."""
     if result.evaluation is None:
         return f"not computed: {result.problem} did not converge"
     values = {row.measure.key: row.value for row in result.evaluation.rows}
@@ -185,7 +182,6 @@ def _gait(number: PaperNumber, result: ProblemResult) -> Ours | str:
 
 
 def _recorded(number: PaperNumber, results: Results, spreads: Spreads) -> Ours | str:
-    """Return what the recordings say."""
     condition = number.subject.removeprefix("recorded-")
     if number.quantity == "largest_deviation" and condition in spreads:
         return _largest_deviation(results.recorded["barefoot"])

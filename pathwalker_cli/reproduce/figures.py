@@ -211,6 +211,5 @@ def _draw(
 
 
 def _gait_handles() -> list[Artist]:
-    """Return the legend entries of the two gaits."""
     looks = {"MAPD-Barefoot": _BAREFOOT, "MAPD-Orthosis": _ORTHOSIS}
     return [style.entry(label, **look) for label, look in looks.items()]

@@ -210,7 +210,6 @@ _GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
 
 
 def _shaping_bounds(result: ProblemResult) -> list[str]:
-    """Return the active bounds that are choices which shape the gait."""
     return [str(bound) for bound in result.bounds if interesting(bound)]
 
 
@@ -245,7 +244,6 @@ def optima_lines(results: Results) -> Iterator[str]:
 
 
 def _optima(result: ProblemResult) -> Iterator[str]:
-    """Yield the table of the local optima of one problem."""
     optima = result.metrics["local_optima"]
     best = optima[0]["cost"]
     yield f"\n{result.problem}, {len(optima)} starts:\n"

@@ -135,5 +135,4 @@ def _solved(folder: Path, studies: Mapping[str, Case], solve: Solve, say: Say) -
 
 
 def _line(name: str, state: str, began: float) -> str:
-    """Return the line of a step."""
     return f"{name:<28}{state:<20}{time.perf_counter() - began:8.1f} s"

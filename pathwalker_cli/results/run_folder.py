@@ -331,7 +331,6 @@ def _file(folder: Path, name: str) -> Path:
 
 
 def _read_metrics(folder: Path) -> dict[str, Any]:
-    """Return the metrics of a run."""
     path = _file(folder, _METRICS)
     metrics = read_json(path, mend="solve again")
     if "run_format" not in metrics:

@@ -208,7 +208,6 @@ def planned(
 
 
 def _given(study: NeighbourStudy, folder: Path) -> Run:
-    """Return the run that was named."""
     if study.set:
         raise ConfigError(
             "overrides values of the base, but --run brings a config of its own",

@@ -260,7 +260,6 @@ class _Explorer(Generic[End]):
         return all(self.rules.distance(from_[0].end, branch.end) > limit for branch in to)
 
     def _distances(self) -> Iterator[float]:
-        """Yield how far neighbours lie apart."""
         for pair in self.graph.edges:
             one, other = (self.ranked(point) for point in pair)
             if one and other:

@@ -228,7 +228,6 @@ def _journal(origin: _Origin) -> Journal:
 
 
 def _solved(journal: Journal, name: str, case: Case) -> Solved:
-    """Solve one neighbour."""
     before = journal.solved
     optimum = journal.resolve(name, case)
     values = measures(optimum) if optimum.converged else {}
@@ -244,7 +243,6 @@ def _solved_here(cases: Mapping[str, Case], origin: _Origin, workers: int) -> It
 
 
 def _solved_elsewhere(cases: Mapping[str, Case], origin: _Origin, workers: int) -> Iterator[Solved]:
-    """Yield what other processes solve."""
     calls = [(origin, name, case) for name, case in cases.items()]
     try:
         yield from results_of_calls(_in_worker, calls, workers)

@@ -149,7 +149,6 @@ class LocalPool:
             yield name, failure(LOST, detail)
 
     def _result(self, future: Future[Result]) -> Result:
-        """Return what a worker handed back."""
         try:
             return future.result()
         except (ProcessExpired, BrokenProcessPool):

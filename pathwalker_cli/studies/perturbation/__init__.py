@@ -178,7 +178,6 @@ def _solved(
 def _perturbed(
     point: _Point, optimum: Optimum, before: Mapping[str, float], ranges: Ranges, tolerance: float
 ) -> Perturbed:
-    """Return one neighbour in numbers."""
     unknown, factor, moved, case = point
     values = measures(optimum) if optimum.converged else {}
     changes = {k: value / before[k] - 1.0 for k, value in values.items() if before[k]}

@@ -160,7 +160,6 @@ def _result(
     points: tuple[FrontPoint, ...],
     seconds_refined: float,
 ) -> Tradeoff:
-    """Return everything as plain numbers."""
     config, solver = near.run.config, near.optimum.solver
     recorded = solver.walker.patient.recorded.get(config.condition)
     ends = [attempt.end.result for attempt in explored.attempts]

@@ -194,7 +194,6 @@ def tradeoff_lines(tradeoff: Tradeoff) -> list[str]:
 
 
 def _line(tradeoff: Tradeoff, point: FrontPoint) -> str:
-    """Return one row of the table."""
     weight = f"{point.walking_speed_weight:9.3g}"
     if not point.solved or point.mesh is None:
         return f"{weight}  {point.status}"

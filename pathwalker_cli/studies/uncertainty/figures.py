@@ -99,7 +99,6 @@ def _stiffness_axis(ax: Axes) -> None:
 
 
 def _limits(spread: Spread) -> str:
-    """Return how often a spring sits at a limit."""
     if spread.lower is None or spread.upper is None:
         return "prescribed"
     return f"softest {100.0 * spread.lower:.0f} %, stiffest {100.0 * spread.upper:.0f} %"
@@ -111,7 +110,6 @@ def _rows(ax: Axes, labels: list[str], top: float) -> None:
 
 
 def _handles(count: int) -> list[Artist]:
-    """Return the entries of the legend."""
     sides = [
         style.entry(s, color=style.LINE_COLOUR[s], marker=style.MARKER[s], linewidth=0,
                     markersize=4.5)

@@ -356,7 +356,6 @@ def _advice(result: Uncertainty) -> Iterator[str]:
 
 
 def _failures(result: Uncertainty) -> Iterator[str]:
-    """Yield what happened to draws that did not converge."""
     if not result.failed:
         return
     share = 100.0 * len(result.failed) / len(result.solved)
@@ -384,7 +383,6 @@ def _extremes(result: Uncertainty, number: int) -> str:
 
 
 def _seconds(result: Uncertainty) -> str:
-    """Return how long it took."""
     fresh = [end for end in result.solved if not end.kept]
     kept = len(result.solved) - len(fresh)
     there = f", {kept} were there already" if kept else ""
