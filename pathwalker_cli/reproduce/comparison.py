@@ -174,10 +174,10 @@ def _inverse(number: PaperNumber, result: InverseResult, results: Results) -> Ou
 
 def _gait(number: PaperNumber, result: ProblemResult) -> Ours | str:
     if result.evaluation is None:
-        return f"not computed: {result.problem} did not converge"
+        return f"not computed: {result.run.config.problem} did not converge"
     values = {row.measure.key: row.value for row in result.evaluation.rows}
-    values["seconds_solve"] = result.metrics["seconds_solve"]
-    values["walking_speed_weight"] = result.config.cost.walking_speed_weight
+    values["seconds_solve"] = result.run.metrics["seconds_solve"]
+    values["walking_speed_weight"] = result.run.config.cost.walking_speed_weight
     return _known(values.get(number.quantity), "the run does not tell")
 
 
@@ -213,7 +213,7 @@ def _why(number: PaperNumber, results: Results) -> str:
         return reason
     parts = [
         f"ours rests on its {bound.side} bound, {bound.value:.4g} {number.unit}"
-        for bound in result.bounds
+        for bound in result.run.result.bounds
         if bound.name == number.quantity
     ][:1]
     parts.append(reason)

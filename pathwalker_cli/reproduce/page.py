@@ -210,7 +210,7 @@ _GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
 
 
 def _shaping_bounds(result: ProblemResult) -> list[str]:
-    return [str(bound) for bound in result.bounds if interesting(bound)]
+    return [str(bound) for bound in result.run.result.bounds if interesting(bound)]
 
 
 def problem_lines(results: Results) -> Iterator[str]:
@@ -218,11 +218,11 @@ def problem_lines(results: Results) -> Iterator[str]:
     problems = results.problems
     rows = [("this call", *("kept" if each.kept else "solved now" for each in problems.values()))]
     for name, show in _SOLVE.items():
-        rows.append((name, *(show(each.metrics) for each in problems.values())))
+        rows.append((name, *(show(each.run.metrics) for each in problems.values())))
     counts = (str(len(_shaping_bounds(p))) if p.converged else "-" for p in problems.values())
     rows.append(("active bounds that shape the gait", *counts))
     for name, show in _GAIT.items():
-        shown = (show(each.metrics) if each.converged else "-" for each in problems.values())
+        shown = (show(each.run.metrics) if each.converged else "-" for each in problems.values())
         rows.append((name, *(text.replace("-, -", "-") for text in shown)))
     yield from table(("", *problems), rows)
     yield "\n*kept*: solved by an earlier call with the same config; its times are those of then."
@@ -235,18 +235,18 @@ def problem_lines(results: Results) -> Iterator[str]:
 def optima_lines(results: Results) -> Iterator[str]:
     """Yield where the starts of every problem ended, best first."""
     for name, each in results.problems.items():
-        optima = each.metrics.get("local_optima") or []
+        optima = each.run.metrics.get("local_optima") or []
         if not optima:
-            yield f"- {name}: one start ({each.metrics['start']})"
+            yield f"- {name}: one start ({each.run.metrics['start']})"
     for each in results.problems.values():
-        if each.metrics.get("local_optima"):
+        if each.run.metrics.get("local_optima"):
             yield from _optima(each)
 
 
 def _optima(result: ProblemResult) -> Iterator[str]:
-    optima = result.metrics["local_optima"]
+    optima = result.run.metrics["local_optima"]
     best = optima[0]["cost"]
-    yield f"\n{result.problem}, {len(optima)} starts:\n"
+    yield f"\n{result.run.config.problem}, {len(optima)} starts:\n"
     shares = [100.0 * (each["cost"] - best) / abs(best) if best and each["cost"] is not None
               else None for each in optima]  # fmt: skip
     rows = [
