@@ -10,14 +10,16 @@ from typing import Any, Final, NamedTuple
 from pydantic import BaseModel
 
 from pathwalker_cli.checking.consistency import odd_orthosis
-from pathwalker_cli.checking.patient import (
+from pathwalker_cli.checking.prediction import check_prediction
+from pathwalker_cli.checking.report import (
+    Changes,
+    Checked,
+    Row,
     orthosis_content,
     patient_content,
     patient_remarks,
     patient_rows,
 )
-from pathwalker_cli.checking.prediction import check_prediction
-from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.checking.studies import check_batch, check_study
 from pathwalker_cli.config import StudyConfig, config_content, find_config
 from pathwalker_cli.conventions import CONDITIONS

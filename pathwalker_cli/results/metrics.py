@@ -129,28 +129,6 @@ def run_inputs(case: Case, warm_start: str | Path | None = None) -> RunInputs:
     return RunInputs(hashes, "" if warm_start is None else str(warm_start))
 
 
-def stiffness_ranges(solution: GaitSolution) -> dict[str, tuple[float, float]]:
-    """Return the range of every free stiffness [N m/rad]; empty when barefoot."""
-    ranges = {name: solution.bounds.table.find(name) for name in STIFFNESSES}
-    return {name: pair for name, pair in ranges.items() if pair is not None}
-
-
-def unknowns(solution: GaitSolution) -> list[dict[str, Any]]:
-    """Return every number that was free to choose: name, place, value, unit and range."""
-    return [
-        {
-            "name": unknown.name,
-            "place": unknown.address,
-            "value": value,
-            "unit": unknown.unit,
-            "range": solution.bounds.ranges[unknown.name],
-        }
-        for unknown, value in zip(
-            solution.walker.unknowns, solution.last_motion.parameters.tolist(), strict=True
-        )
-    ]
-
-
 def metrics_hash(metrics: Mapping[str, Any]) -> str:
     """Return the SHA-256 of all metrics but the one that holds it."""
     return sha256(json_text({k: v for k, v in metrics.items() if k != METRICS_HASH}).encode())
@@ -192,7 +170,7 @@ def _outcome(solution: GaitSolution) -> dict[str, Any]:
 
 def _proof(solution: GaitSolution) -> dict[str, Any]:
     """Return what speaks for the result, and what held it back."""
-    errors, worst = solution.reintegration, solution.violations[0]
+    errors, worst, bounds = solution.reintegration, solution.violations[0], solution.bounds
     return {
         "largest_violation": worst.amount,
         "largest_violation_name": worst.name,
@@ -205,9 +183,22 @@ def _proof(solution: GaitSolution) -> dict[str, Any]:
         "shortfall": None if solution.shortfall is None else solution.shortfall.as_dict(),
         "active_bounds": [str(bound) for bound in solution.active],
         "active": [asdict(bound) for bound in solution.active],
-        "stiffness_ranges": stiffness_ranges(solution),
-        "unknowns": unknowns(solution),
-        "bound_sources": solution.bounds.sources,
+        "stiffness_ranges": {
+            name: pair for name in STIFFNESSES if (pair := bounds.table.find(name)) is not None
+        },
+        "unknowns": [
+            {
+                "name": unknown.name,
+                "place": unknown.address,
+                "value": value,
+                "unit": unknown.unit,
+                "range": bounds.ranges[unknown.name],
+            }
+            for unknown, value in zip(
+                solution.walker.unknowns, solution.last_motion.parameters.tolist(), strict=True
+            )
+        ],
+        "bound_sources": bounds.sources,
         "notes": solution.walker.patient.notes,
     }
 
