@@ -193,7 +193,7 @@ def solve_all(
     folder: Path,
     tolerance: float,
     workers: int,
-    report: Callable[[Solved], None],
+    report: Callable[[int, Solved], None],
 ) -> list[Solved]:
     """Return solved neighbours by rising name; every one starts from the run itself.
 
@@ -205,15 +205,15 @@ def solve_all(
         folder: Folder of the journal.
         tolerance: Optimality tolerance.
         workers: Processes; with one, this process does it.
-        report: Hears of every one as they come.
+        report: Hears of every one as they come, counted from 1.
 
     Raises:
         NotConvergedError: If the user stopped it, or a process was ended from outside.
     """
     source = _solved_here if min(workers, len(cases)) == 1 else _solved_elsewhere
     ends = []
-    for solved in source(cases, (run, folder, tolerance), workers):
-        report(solved)
+    for done, solved in enumerate(source(cases, (run, folder, tolerance), workers), start=1):
+        report(done, solved)
         ends.append(solved)
     return sorted(ends, key=lambda solved: solved.name)
 
