@@ -65,13 +65,27 @@ class Moved(_Block):
 class PerturbationSummary(Summary):
     """What `perturb` tells."""
 
+    optimum: Numbers
     rows: list[Moved]
 
 
 class SensitivitySummary(Summary):
     """What `sensitivity` tells."""
 
+    optimum: Numbers
     elasticities: dict[str, Numbers]
+
+
+class _Point(_Block):
+    dorsiflexion_stiffness: Number
+    plantarflexion_stiffness: Number
+    measures: Numbers
+
+
+class _Region(_Block):
+    dorsiflexion_stiffness: Pair
+    plantarflexion_stiffness: Pair
+    share_of_points: float
 
 
 class LandscapeSummary(Summary):
@@ -81,6 +95,9 @@ class LandscapeSummary(Summary):
     tolerance: Annotated[float, Field(ge=0.0)]
     dorsiflexion_stiffness: list[float]
     plantarflexion_stiffness: list[float]
+    start: _Point
+    best: _Point
+    region: _Region | None
 
 
 class TradeoffSummary(RootModel[Tradeoff]):
