@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from pathwalker_cli.config.schema import Weight
-from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.io.fields import AS_TUPLE, invalid
@@ -146,8 +145,10 @@ def _refined(point: FrontPoint, optimum: Optimum, work: Work) -> tuple[FrontPoin
     numbers = {
         m.key: metrics[m.key] for m in measures_in("studies") if metrics.get(m.key) is not None
     }
-    found = zip(optimum.solver.walker.unknowns, run.motion.parameters.tolist(), strict=True)
-    numbers |= {unknown.name: value for unknown, value in found if unknown.name not in STIFFNESSES}
+    unknowns = optimum.solver.walker.unknowns
+    for name in free_units(unknowns):
+        which = [unknown.name for unknown in unknowns].index(name)
+        numbers[name] = float(run.motion.parameters[which])
     better = replace(
         point, mesh="refined", measures=numbers, errors=errors, intervals=metrics["intervals"]
     )
