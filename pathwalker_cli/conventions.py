@@ -69,11 +69,6 @@ def worn_words(braced: Collection[Side]) -> str:
     return one if len(braced) == 1 else "with orthoses"
 
 
-def coordinate_index(name: str) -> int:
-    """Return the position of a generalised coordinate in `COORDINATES`."""
-    return COORDINATES.index(name)
-
-
 def coordinate_unit(name: str) -> str:
     """Return the SI unit of a generalised coordinate: "m" or "rad"."""
     return "m" if name in TRANSLATIONS else "rad"

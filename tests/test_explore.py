@@ -22,7 +22,7 @@ from pathwalker_cli.config import load_config, smoke_version, with_values
 from pathwalker_cli.errors import InputError, NotConvergedError
 from pathwalker_cli.explore.dials import case_at, settings_of
 from pathwalker_cli.explore.offline import offline_page
-from pathwalker_cli.explore.picture import picture
+from pathwalker_cli.explore.page import picture
 from pathwalker_cli.explore.server import serve
 from pathwalker_cli.explore.session import STOPPED, Session
 from pathwalker_cli.explore.worker import Worker

@@ -27,11 +27,11 @@ from pathwalker_cli.commands.complete import (
     complete_runs,
 )
 from pathwalker_cli.commands.examples import EXAMPLES
-from pathwalker_cli.commands.studies import StudyCall
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.problems import PROBLEMS
+from pathwalker_cli.studies import base
 from pathwalker_cli.studies import run as study_run
 from pathwalker_cli.studies.batch import cases, study
 from pathwalker_cli.studies.batch.ledger import Ended
@@ -287,7 +287,7 @@ def test_a_study_whose_base_fails_says_so(here: Path, monkeypatch: pytest.Monkey
     def fail(*_: Any) -> None:
         raise NotConvergedError("mapd-orthosis, on which the study stands, did not converge")
 
-    monkeypatch.setattr(StudyCall, "base", fail)
+    monkeypatch.setattr(base, "base_run", fail)
     for name in ("sensitivity", "landscape", "tradeoff"):
         result = run(name, name, "--json")
         assert result.exit_code == 1

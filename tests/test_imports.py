@@ -65,7 +65,7 @@ CONFINED = {
         "animation.viewer",
         "starter.example",
     ),
-    "jinja2": ("io.templates", "animation.html", "report.html", "starter"),
+    "jinja2": ("io.templates", "animation.html", "report.page", "starter"),
     "matplotlib": (
         "animation.film",
         "stride.figures",

@@ -17,12 +17,11 @@ from click.testing import CliRunner
 from made_neighbours import LIMIT, Fails, MadeResolver, made_measures, made_run
 from pathwalker_cli.case import load_case
 from pathwalker_cli.cli import cli
-from pathwalker_cli.commands.studies import StudyCall
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.results.run_folder import write_run
+from pathwalker_cli.studies import base, neighbours
 from pathwalker_cli.studies import landscape as module
-from pathwalker_cli.studies import neighbours
 from pathwalker_cli.studies.base import Work, load_study
 from pathwalker_cli.studies.landscape import (
     STUDY,
@@ -313,7 +312,7 @@ def test_the_command_writes_everything(
     made: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made()
-    monkeypatch.setattr(StudyCall, "base", lambda *_: made_run(tmp_path))
+    monkeypatch.setattr(base, "base_run", lambda *_: made_run(tmp_path))
     words = [word for change in COARSE for word in ("--set", change)]
     done = run("landscape", "--out", tmp_path / "out", *words)
     assert done.exit_code == 0, done.output

@@ -27,7 +27,7 @@ from pathwalker_cli.gait.solve import GaitSolver, solve_study
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.report.gait_page import gait_page
-from pathwalker_cli.report.html import page_html
+from pathwalker_cli.report.page import page_html
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.figures.save import make_figure

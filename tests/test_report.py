@@ -29,8 +29,7 @@ from pathwalker_cli.report import figures
 from pathwalker_cli.report.changes import Outcome
 from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
 from pathwalker_cli.report.gait_page import gait_page
-from pathwalker_cli.report.html import page_html
-from pathwalker_cli.report.page import page_of
+from pathwalker_cli.report.page import page_html, page_of
 from pathwalker_cli.report.pdf import page_pdf
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.springs import recommended, spring_section, verdict_words

@@ -17,10 +17,9 @@ from click.testing import CliRunner
 from made_neighbours import LIMIT, Fails, MadeResolver, made_measures, made_run, speed
 from pathwalker_cli.case import load_case
 from pathwalker_cli.cli import cli
-from pathwalker_cli.commands.studies import StudyCall
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.errors import ConfigError
-from pathwalker_cli.studies import neighbours
+from pathwalker_cli.studies import base, neighbours
 from pathwalker_cli.studies import tradeoff as module
 from pathwalker_cli.studies.base import Work, load_study
 from pathwalker_cli.studies.tradeoff import STUDY, TradeoffStudy, chain, tradeoff_of
@@ -255,7 +254,7 @@ def test_the_command_writes_everything(
     made: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made()
-    monkeypatch.setattr(StudyCall, "base", lambda *_: made_run(tmp_path))
+    monkeypatch.setattr(base, "base_run", lambda *_: made_run(tmp_path))
     words = ("tradeoff", "--out", tmp_path / "out", "--set", *FOUR)
     done = run(*words)
     assert done.exit_code == 0, done.output

@@ -34,7 +34,6 @@ from pathwalker_cli.studies.uncertainty.result import (
     rank_correlations,
     span_text,
     span_words,
-    spreads,
     uncertainty_content,
 )
 
@@ -328,7 +327,7 @@ def test_real_draws_do_not_depend_on_the_number_of_processes(tmp_path: Path) -> 
     assert not one.failed
     for a, b in zip(one.solved, two.solved, strict=True):
         assert a.values == pytest.approx(b.values, rel=1e-9)
-    found = {spread.measure.key: spread for spread in spreads(one)}
+    found = {spread.measure.key: spread for spread in one.spreads}
     assert found["cost"].quantiles[0] < found["cost"].quantiles[2]
     for name in STIFFNESSES:
         low, high = one.ranges[name]

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES, Condition, coordinate_index
+from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES, Condition
 from pathwalker_cli.model.anthropometry import segments
 from pathwalker_cli.model.urdf import pinocchio_model, urdf_text
 from pathwalker_cli.paths import shipped
@@ -31,7 +31,7 @@ def pose(**angles: float) -> np.ndarray:
     """Return q with the named coordinates set."""
     q = np.zeros(len(COORDINATES))
     for name, value in angles.items():
-        q[coordinate_index(name)] = value
+        q[COORDINATES.index(name)] = value
     return q
 
 

@@ -10,14 +10,16 @@ from typing import Any, Final, NamedTuple
 from pydantic import BaseModel
 
 from pathwalker_cli.checking.consistency import odd_orthosis
-from pathwalker_cli.checking.patient import (
+from pathwalker_cli.checking.prediction import check_prediction
+from pathwalker_cli.checking.report import (
+    Changes,
+    Checked,
+    Row,
     orthosis_content,
     patient_content,
     patient_remarks,
     patient_rows,
 )
-from pathwalker_cli.checking.prediction import check_prediction
-from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.checking.studies import check_batch, check_study
 from pathwalker_cli.config import StudyConfig, config_content, find_config
 from pathwalker_cli.conventions import CONDITIONS
@@ -43,31 +45,31 @@ from pathwalker_cli.studies.batch.schema import BatchStudy
 from pathwalker_cli.studies.registry import STUDIES
 
 
-def check_kinematics(path: str, changes: Changes = ()) -> Checked:
-    """Return what `ik` would do."""
-    config = load_inverse_kinematics(path, changes)
+def _check_recorded(
+    kind: str,
+    load: Callable[[str, Changes], InverseKinematicsConfig | InverseDynamicsConfig],
+    path: str,
+    changes: Changes = (),
+) -> Checked:
+    """Return what `ik` or `id` would do."""
+    config = load(path, changes)
     with placed(path):
         patient = load_patient(config.patient)
-        trials = _c3d(config, patient)
-    return _recorded_study(path, "inverse kinematics", patient, trials, "C3D files")
-
-
-def check_dynamics(path: str, changes: Changes = ()) -> Checked:
-    """Return what `id` would do."""
-    config = load_inverse_dynamics(path, changes)
-    with placed(path):
-        patient = load_patient(config.patient)
-        require_trials(config, patient)
-        if config.source == "c3d":
+        where = "C3D files"
+        if isinstance(config, InverseDynamicsConfig):
+            require_trials(config, patient)
+            where = "C3D files" if config.source == "c3d" else "recordings beside the patient"
+        if where == "C3D files":
             trials = _c3d(config, patient)
-            return _recorded_study(path, "inverse dynamics", patient, trials, "C3D files")
-        trials = {c: list(recording_names(patient, c)) for c in config.conditions}
-        for condition in config.conditions:
-            for name in trials[condition]:
-                read_recording(patient, condition, name)
-    return _recorded_study(
-        path, "inverse dynamics", patient, trials, "recordings beside the patient"
-    )
+        else:
+            trials = {c: list(recording_names(patient, c)) for c in config.conditions}
+            for condition in config.conditions:
+                for name in trials[condition]:
+                    read_recording(patient, condition, name)
+    rows = [*patient_rows(patient)]
+    rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in trials.items() if n]
+    content: dict[str, Any] = {"patient": patient_content(patient), "trials": trials}
+    return Checked(path, kind, tuple(rows), content, patient_remarks(patient))
 
 
 def check_markers(path: str, changes: Changes = ()) -> Checked:
@@ -120,7 +122,6 @@ def check_orthosis(path: str, changes: Changes = ()) -> Checked:
 
 
 def _require_none(changes: Changes, path: str) -> None:
-    """Refuse overrides of what is no config."""
     if changes:
         raise ConfigError(
             f"overrides keys of configs, and {path} is none",
@@ -141,15 +142,6 @@ def _c3d(config: RecordedConfig, patient: Patient) -> dict[str, list[str]]:
     return trials
 
 
-def _recorded_study(
-    path: str, kind: str, patient: Patient, trials: dict[str, list[str]], where: str
-) -> Checked:
-    rows = [*patient_rows(patient)]
-    rows += [(c, f"{len(n)} {where}: {', '.join(n)}") for c, n in trials.items() if n]
-    content: dict[str, Any] = {"patient": patient_content(patient), "trials": trials}
-    return Checked(path, kind, tuple(rows), content, patient_remarks(patient))
-
-
 Check = Callable[[str, Changes], Checked]
 
 
@@ -168,8 +160,16 @@ KINDS: Final[dict[str, Kind]] = {
         for command, entry in STUDIES.items()
     },
     "cohort": Kind(BatchStudy, check_batch, "pathwalker batch"),
-    "inverse-kinematics": Kind(InverseKinematicsConfig, check_kinematics, "pathwalker ik"),
-    "inverse-dynamics": Kind(InverseDynamicsConfig, check_dynamics, "pathwalker id"),
+    "inverse-kinematics": Kind(
+        InverseKinematicsConfig,
+        partial(_check_recorded, "inverse kinematics", load_inverse_kinematics),
+        "pathwalker ik",
+    ),
+    "inverse-dynamics": Kind(
+        InverseDynamicsConfig,
+        partial(_check_recorded, "inverse dynamics", load_inverse_dynamics),
+        "pathwalker id",
+    ),
     "markers": Kind(
         MarkerSet,
         check_markers,

@@ -9,13 +9,15 @@ from typing import Any, Final
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.checking.consistency import contradictions, oddities
-from pathwalker_cli.checking.patient import (
+from pathwalker_cli.checking.report import (
+    Changes,
+    Checked,
+    Row,
     orthosis_content,
     patient_content,
     patient_remarks,
     walker_rows,
 )
-from pathwalker_cli.checking.report import Changes, Checked, Row
 from pathwalker_cli.config import StudyConfig, load_config
 from pathwalker_cli.config.values import changed_values
 from pathwalker_cli.conventions import CONDITIONS

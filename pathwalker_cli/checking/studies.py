@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from pathwalker_cli.checking.patient import walker_rows
 from pathwalker_cli.checking.prediction import described, ready_solver
-from pathwalker_cli.checking.report import Changes, Checked, Row
+from pathwalker_cli.checking.report import Changes, Checked, Row, walker_rows
 from pathwalker_cli.errors import placed
 from pathwalker_cli.studies.base import base_case, load_study
 from pathwalker_cli.studies.batch.cases import load_cases

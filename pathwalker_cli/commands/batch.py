@@ -92,7 +92,6 @@ def batch_command(
 def _pool(
     workers: int | None, scheduler: str | None, time_limit: float | None
 ) -> AbstractContextManager[Pool]:
-    """Return whoever solves the cases."""
     import os
 
     if scheduler is None:

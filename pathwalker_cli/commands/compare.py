@@ -45,7 +45,6 @@ def compare_command(runs: tuple[Path, ...], out: Path | None, as_json: bool) -> 
 
 
 def _write(out: Path, comparison: Comparison) -> None:
-    """Write tables and figures, all or none."""
     from pathwalker_cli.evaluation.curves import traces
     from pathwalker_cli.evaluation.figures import save_overlays
     from pathwalker_cli.io.atomic import staged_folder
@@ -109,7 +108,6 @@ def _write_evaluation(
 
 
 def _report(evaluations: Sequence[Evaluation], changes: Sequence[Change], out: Path) -> None:
-    """Print the tables and what to know about them."""
     from pathwalker_cli.evaluation.tables import change_lines, evaluation_lines, evaluation_notes
 
     for each in evaluations:

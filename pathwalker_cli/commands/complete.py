@@ -90,15 +90,9 @@ def _is_run(folder: Path) -> bool:
 
 
 def _is_reported(folder: Path) -> bool:
-    """Return whether a report can be made of a folder."""
-    from pathwalker_cli.errors import DataError
-    from pathwalker_cli.report.folders import folder_kind
+    from pathwalker_cli.report.folders import kind_of
 
-    try:
-        folder_kind(folder)
-    except DataError:
-        return False
-    return True
+    return kind_of(folder) is not None
 
 
 def _holds(folder: Path, wanted: Callable[[Path], bool]) -> bool:

@@ -35,8 +35,7 @@ def report_command(runs: tuple[Path, ...], out: Path | None, pdf: Path | None) -
     """
     from pathwalker_cli.errors import DataError
     from pathwalker_cli.io.atomic import atomic_open, check_output, write_text
-    from pathwalker_cli.report.html import page_html
-    from pathwalker_cli.report.page import page_of
+    from pathwalker_cli.report.page import page_html, page_of
 
     if out is None and pdf is None:
         raise DataError("names no file", where="report", mend="add -o FILE.html or --pdf FILE.pdf")

@@ -54,8 +54,7 @@ class Progress(RunLog):
         self._live: Live | None = None
         self._drawn = 0.0
         self._stage = ""
-        self._last = ""
-        self._shown = ""
+        self._shown = 0
 
     def __enter__(self) -> Progress:
         """Begin to show."""
@@ -71,7 +70,7 @@ class Progress(RunLog):
 
     def __exit__(self, *_: object) -> None:
         """Show how the last stage ended and take the live line away."""
-        self._end_stage()
+        self._show()
         if self._live is not None:
             self._live.stop()
 
@@ -79,38 +78,34 @@ class Progress(RunLog):
         """Take note of one iteration."""
         self._begin()
         if stage != self._stage:
-            self._end_stage()
+            self._show()
             self._stage = stage
         super().__call__(stage, report)
-        self._last = self.lines[-1]
         now = time.perf_counter()
         if self._live is None:
             if report.iteration % EVERY == 0:
-                self._print()
+                self._show()
         elif now - self._drawn >= PAUSE:
             self._drawn = now
-            self._live.update(Text(self._last, no_wrap=True, overflow="crop"), refresh=True)
+            self._live.update(Text(self.lines[-1], no_wrap=True, overflow="crop"), refresh=True)
 
     def optimum(self, end: LocalOptimum) -> None:
         """Take note of where one of several starts ended."""
         self._begin()
-        self._end_stage()
+        self._show()
         super().optimum(end)
-        self._last = self.lines[-1]
-        self._print()
+        self._show()
 
     def _begin(self) -> None:
         heading, self._heading = self._heading, ()
         for line in heading:
             self._console.print(line, style="")
 
-    def _end_stage(self) -> None:
-        if self._last != self._shown:
-            self._print()
-
-    def _print(self) -> None:
-        self._shown = self._last
-        self._console.print(self._last)
+    def _show(self) -> None:
+        """Show the last line unless it was shown."""
+        if self._shown < len(self.lines):
+            self._shown = len(self.lines)
+            self._console.print(self.lines[-1])
 
 
 class BatchProgress(Watch):
@@ -161,7 +156,6 @@ class BatchProgress(Watch):
             self._bar.update(self._row, completed=self._ended, state=self._state())
 
     def _state(self) -> str:
-        """Return how many cases failed and run."""
         parts = [f"{self._failed} failed"] * bool(self._failed)
         if self._workers is not None:
             parts.append(f"{min(self._workers, self._total - self._ended)} running")

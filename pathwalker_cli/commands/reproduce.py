@@ -61,7 +61,6 @@ def reproduce_command(out: Path, quick: bool, starts: int, c3d: Path | None, qui
 
 
 def _solve(case: Case, folder: Path, quiet: bool) -> None:
-    """Solve a study into its run folder."""
     from pathwalker_cli.commands.progress import Progress
     from pathwalker_cli.errors import NotConvergedError
     from pathwalker_cli.studies.run import run_study

@@ -102,8 +102,6 @@ def _worn(case: Case) -> tuple[str, ...]:
 
 
 def _report(outcome: Outcome, folder: Path) -> None:
-    """Print the summary of a run."""
-    from pathwalker_cli.results.metrics import stiffness_ranges
     from pathwalker_cli.results.text import (
         detail_lines,
         notes_together,
@@ -120,7 +118,7 @@ def _report(outcome: Outcome, folder: Path) -> None:
         click.echo("SMOKE: a quick check on a coarse mesh; its numbers are not for use.\n")
     notes = []
     if solution.converged:
-        notes = spring_notes(metrics, stiffness_ranges(solution)) + solution_notes(solution)
+        notes = spring_notes(metrics, metrics["stiffness_ranges"]) + solution_notes(solution)
     _echo(summary_rows(metrics, solution.status, solution.cost), notes)
     click.echo()
     if verdict is not None:

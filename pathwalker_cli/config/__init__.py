@@ -10,6 +10,5 @@ from pathwalker_cli.config.schema import BoundsConfig as BoundsConfig
 from pathwalker_cli.config.schema import MeshConfig as MeshConfig
 from pathwalker_cli.config.schema import StartConfig as StartConfig
 from pathwalker_cli.config.schema import StudyConfig as StudyConfig
-from pathwalker_cli.config.values import apply_change as apply_change
 from pathwalker_cli.config.values import smoke_version as smoke_version
 from pathwalker_cli.config.values import with_values as with_values

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from pathwalker_cli.config.learnt import Learnt, config_values
 from pathwalker_cli.config.schema import StudyConfig, merged
-from pathwalker_cli.config.values import apply_change, nested
+from pathwalker_cli.config.values import PLACES, apply_change, nested
 from pathwalker_cli.errors import ConfigError, did_you_mean
 from pathwalker_cli.io.refusals import KeyPath, Lines
 from pathwalker_cli.io.yaml_file import read_mapping, validate
@@ -46,7 +46,7 @@ def read_config(
     path: str | Path,
     model: type[Model],
     changes: tuple[str, ...] = (),
-    apply: Callable[[dict[str, Any], str], KeyPath] = apply_change,
+    places: Collection[KeyPath] = PLACES,
     complete: Callable[[dict[str, Any], Path, tuple[str, ...]], None] = lambda *_: None,
 ) -> tuple[Model, Path]:
     """Read a config of any kind; return it and its file.
@@ -55,7 +55,7 @@ def read_config(
         path: The YAML file, or the name of a shipped one.
         model: Model of its content.
         changes: Overrides "dotted.key=value", as from the command line.
-        apply: Puts one of them into the content and returns the key that it changes.
+        places: Mappings whose keys have dots.
         complete: Puts into the content, from this file with these overrides, what other files hold.
 
     Raises:
@@ -64,7 +64,7 @@ def read_config(
     source, mapping, lines = config_content(path)
     origins = dict(lines)
     for change in changes:
-        key = apply(mapping, change)
+        key = apply_change(mapping, change, places)
         for replaced in [k for k in origins if k[: len(key)] == key]:
             del origins[replaced]
         origins[key] = f"--set {change}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from pathwalker_cli.config.schema import StudyConfig, merged
@@ -14,11 +14,18 @@ NO_VALUE: Final = "-"
 """Stands for the value of a key that a config does not have, such as one of a mapping."""
 
 
-PLACES: Final = (("variation", "scale"), ("variation", "shift"), ("numbers",), ("free",))
+PLACES: Final[tuple[KeyPath, ...]] = (
+    ("variation", "scale"),
+    ("variation", "shift"),
+    ("numbers",),
+    ("free",),
+)
 """Mappings whose keys are dotted places themselves, e.g. "strengths.knee_extension.left"."""
 
 
-def apply_change(mapping: dict[str, Any], change: str) -> KeyPath:
+def apply_change(
+    mapping: dict[str, Any], change: str, places: Collection[KeyPath] = PLACES
+) -> KeyPath:
     """Put one override "a.b=value" (value: YAML) into a mapping; return its key.
 
     Raises:
@@ -27,10 +34,10 @@ def apply_change(mapping: dict[str, Any], change: str) -> KeyPath:
     key, equals, text = change.partition("=")
     if not equals or not key.strip():
         raise ConfigError(f"'{change}' is no override", where="--set", allowed="dotted.key=value")
+    path = _path(key.strip(), places)
     value = read_value(text, f"--set {change}")
-    inner, last = _holder(mapping, key.strip(), f"--set {change}")
-    inner[last] = value
-    return tuple(key.strip().split("."))
+    _holder(mapping, path, f"--set {change}")[path[-1]] = value
+    return path
 
 
 def with_values(config: StudyConfig, values: Mapping[str, Any], where: str = "") -> StudyConfig:
@@ -48,9 +55,12 @@ def with_values(config: StudyConfig, values: Mapping[str, Any], where: str = "")
     """
     content: dict[str, Any] = config.model_dump(mode="json")
     for key, value in values.items():
-        inner, last = _holder(content, key, f"{where}, {key}")
-        whole = last == key and isinstance(value, Mapping) and isinstance(inner.get(last), dict)
-        inner[last] = merged(inner[last], value) if whole else value
+        path = _path(key)
+        inner = _holder(content, path, f"{where}, {key}")
+        whole = len(path) == 1 and isinstance(inner.get(key), dict)
+        if isinstance(value, Mapping):
+            value = merged(inner[key] if whole else {}, value)
+        inner[path[-1]] = value
     return validate(content, StudyConfig, where=where or "overrides", error=ConfigError)
 
 
@@ -58,8 +68,8 @@ def nested(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return values by dotted key as the content of a config."""
     content: dict[str, Any] = {}
     for key, value in values.items():
-        inner, last = _holder(content, key, key)
-        inner[last] = value
+        path = _path(key)
+        _holder(content, path, key)[path[-1]] = value
     return content
 
 
@@ -112,18 +122,23 @@ def _entries(prefix: str, content: Mapping[str, Any]) -> Iterator[tuple[str, Any
             yield f"{prefix}{key}", value
 
 
-def _holder(mapping: dict[str, Any], key: str, where: str) -> tuple[dict[str, Any], str]:
-    """Return the mapping that holds a dotted key, made where it lacks, and the key's last part.
+def _path(key: str, places: Collection[KeyPath] = PLACES) -> tuple[str, ...]:
+    """Return the parts of a dotted key; what stands in one of `places` has dots in its name."""
+    parts = tuple(key.split("."))
+    for names in places:
+        if len(parts) > len(names) and parts[: len(names)] == names:
+            return (*parts[: len(names)], ".".join(parts[len(names) :]))
+    return parts
+
+
+def _holder(mapping: dict[str, Any], path: tuple[str, ...], where: str) -> dict[str, Any]:
+    """Return the mapping that holds a key, made where it lacks.
 
     Raises:
         ConfigError: If there is a value on the way that holds no keys.
     """
-    *parents, last = key.split(".")
-    for names in PLACES:  # what stands in them by its place has the dots in its name
-        if (*parents[: len(names)],) == names:
-            parents, last = [*names], ".".join([*parents[len(names) :], last])
-    for parent in parents:
+    for parent in path[:-1]:
         mapping = mapping.setdefault(parent, {})
         if not isinstance(mapping, dict):
             raise ConfigError(f"'{parent}' holds no keys", where=where)
-    return mapping, last
+    return mapping

@@ -71,8 +71,7 @@ class Dial:
 
 def dials_of(optimum: Optimum) -> tuple[Dial, ...]:
     """Return the dials of a run, by group."""
-    found = (*_springs(optimum), *_device(optimum), *_wish(optimum), *_strengths(optimum),
-             *_tightness(optimum))  # fmt: skip
+    found = (*_springs(optimum), *_device(optimum), *_wish(optimum), *_body(optimum))
     return tuple(dial for dial in found if dial.low < dial.high)
 
 
@@ -121,7 +120,6 @@ def _springs(optimum: Optimum) -> Iterator[Dial]:
 
 
 def _device(optimum: Optimum) -> Iterator[Dial]:
-    """Yield the other numbers of the device."""
     device = optimum.walker.device
     if not device.worn:
         return
@@ -137,15 +135,11 @@ def _device(optimum: Optimum) -> Iterator[Dial]:
         yield from _dial(optimum, "Orthosis", number, *(f * value for f in _MASS))
 
 
-def _strengths(optimum: Optimum) -> Iterator[Dial]:
-    """Yield the strength of every muscle torque generator."""
+def _body(optimum: Optimum) -> Iterator[Dial]:
+    """Yield strengths, and what was measured on the couch if the model has tissue."""
     for muscle in optimum.walker.muscles:
         value = optimum.walker.values[muscle.numbers[0].address]
         yield from _dial(optimum, "Strength", muscle.numbers[0], *(f * value for f in _STRENGTH))
-
-
-def _tightness(optimum: Optimum) -> Iterator[Dial]:
-    """Yield what was measured on the couch, if the model has tissue."""
     for number in (number for element in optimum.walker.tissue for number in element.numbers):
         if number.address.startswith("examination."):
             value = optimum.walker.values[number.address]
@@ -153,7 +147,6 @@ def _tightness(optimum: Optimum) -> Iterator[Dial]:
 
 
 def _wish(optimum: Optimum) -> Iterator[Dial]:
-    """Yield what is wanted of the walk."""
     config, group = optimum.config, "Wish"
     least = optimum.solver.bounds.table.entries[("walking_speed",)][0]
     yield Dial(_SPEED, group, "least walking speed", "m/s", None, 0.5 * least,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
-from pathwalker_cli.explore.page import explore_page
-from pathwalker_cli.explore.picture import picture
+from pathwalker_cli.explore.page import explore_page, picture
 from pathwalker_cli.explore.session import Session
 from pathwalker_cli.report.folders import studies_near
 from pathwalker_cli.results.run_folder import Run

@@ -152,7 +152,6 @@ class Desk:
             self._connection.send({"kind": "save", "number": self._moves, "name": name})
 
     def _hear(self) -> None:
-        """Take what the solver says."""
         try:
             message = self._connection.recv()
         except (EOFError, OSError):

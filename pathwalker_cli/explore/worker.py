@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli.errors import InputError, NotConvergedError, PathwalkerError
-from pathwalker_cli.explore.page import explore_page
-from pathwalker_cli.explore.picture import picture
+from pathwalker_cli.explore.page import explore_page, picture
 from pathwalker_cli.explore.session import STOPPED, Session
 from pathwalker_cli.gait.resolve import Optimum
 from pathwalker_cli.io.processes import prepare_worker
@@ -113,7 +112,6 @@ class Worker:
             _ = end.kkt.factors
 
     def _save(self, message: Message) -> None:
-        """Write what is shown as a run."""
         folder = self._places / message["name"]
         shown, (solution, _, _) = self._session.optimum.cost, self._session.save(folder)
         if not solution.converged:

@@ -101,7 +101,6 @@ def _wearing(run: ReportRun) -> str:
 
 
 def _springs(run: ReportRun, several: bool) -> str:
-    """Return which springs to fit."""
     named = f" of {run.label}" if several else ""
     if all(prescribed(run, name) for name in run.springs):
         return f"The springs{named} were given, not searched for: {_values(run, run.springs)}."
@@ -148,7 +147,6 @@ def hinge_section(runs: Sequence[ReportRun], studies: Sequence[Study]) -> Sectio
 
 
 def _hinges(run: ReportRun) -> Iterator[str]:
-    """Yield what a run hangs on."""
     config, named = run.run.config, f"{run.label}: "
     for note in run.evaluation.unusual:
         yield f"{named}{note}"

@@ -61,7 +61,6 @@ def _aim(config: StudyConfig) -> str:
 
 
 def _facts(run: ReportRun) -> dict[str, str]:
-    """Return a sentence by label."""
     result, config = run.run.result, run.run.config
     mesh, solver = config.mesh, config.solver
     quirks = ", with the quirks of the published model" if result.published_model else ""

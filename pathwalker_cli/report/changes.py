@@ -42,14 +42,9 @@ _ENOUGH: Final = 3
 
 @dataclass(frozen=True)
 class Outcome:
-    """One measure of walking barefoot and with orthoses; SI units.
+    """One measure of walking barefoot and with orthoses, in each run; SI units.
 
-    Args:
-        measure: What it is.
-        more_is_better: Whether more of it is better.
-        values: Its value in each run.
-        recorded: Per condition, what recordings say.
-        set_by_bound: Whether the config set it in a run.
+    `recorded` is by condition; `set_by_bound` says in which runs the config set it.
     """
 
     measure: Measure

@@ -43,7 +43,6 @@ def cohort_page(folders: Sequence[Path]) -> Page:
 
 
 def _counts(rows: Rows) -> dict[str, int]:
-    """Return how many cases converged, failed and wait."""
     states = [row["status"] for row in rows]
     done, waiting = states.count(CONVERGED), states.count(PENDING)
     return {"Converged": done, "Failed": len(rows) - done - waiting, "Not yet run": waiting}
@@ -62,7 +61,6 @@ def _warnings(counts: Mapping[str, int], tables: Mapping[Path, Rows]) -> Iterato
 
 
 def _section(folder: Path, rows: Rows) -> Section:
-    """Return the table of a batch."""
     notes = (
         "re-integration: by how much an independent integrator misses the next node at most",
         "r, l: right, left; springs are those of least effort, K_D against dorsiflexion, K_P "

@@ -47,13 +47,10 @@ _DEPENDS: Final = {
 
 @dataclass(frozen=True)
 class Compared:
-    """One metric of all runs; SI units.
+    """One metric of all runs, None where a run does not have it; SI units.
 
-    Args:
-        measure: What it is.
-        values: Its value in each run, None where a run does not have it.
-        other: Runs whose config gives it another meaning than the first run's: no difference is
-            told.
+    In the runs of `other` the config gives it another meaning than in the first one: no difference
+    is told.
     """
 
     measure: Measure

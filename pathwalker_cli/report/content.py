@@ -28,12 +28,9 @@ class Fact:
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table.
+    """A row of a table, one text per column; a mark says what the reader shall see at once.
 
-    Args:
-        cells: One text per column; a heading has one for all of them, a shared row one for all but
-            the first.
-        mark: What the reader shall see at once: a heading, a failure, or what to look at.
+    A heading has one text for all columns, a shared row one for all but the first.
     """
 
     cells: tuple[str, ...]

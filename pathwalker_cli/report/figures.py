@@ -73,7 +73,6 @@ def torque_drawing(trials: Sequence[Trial], body_mass: float, name: str, title: 
 
 
 def _traces(runs: Sequence[ReportRun]) -> tuple[Trace, ...]:
-    """Return the gaits of the runs over their recordings."""
     gaits = [run.evaluation.gait for run in runs]
     return traces(gaits, [run.label for run in runs], [run.evaluation.recorded for run in runs])
 

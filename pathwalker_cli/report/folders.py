@@ -41,14 +41,7 @@ tolerance of its own, which may move springs that the cost does not determine.""
 
 @dataclass(frozen=True)
 class Study:
-    """A study around an optimum.
-
-    Args:
-        folder: Its folder.
-        kind: Which command made it.
-        content: Its summary.
-        summary: The same, typed: a member of `SUMMARIES`.
-    """
+    """A study around an optimum: its folder, its command, its summary, and the same as a type."""
 
     folder: Path
     kind: Kind
@@ -90,13 +83,14 @@ def folder_kind(folder: Path) -> Kind:
     if not folder.is_dir():
         what = "is a file" if folder.exists() else "no such folder"
         raise DataError(what, where=str(folder), allowed=_ALLOWED)
-    kind = _kind(folder)
+    kind = kind_of(folder)
     if kind is None:
         raise DataError("holds nothing to report", where=str(folder), allowed=_ALLOWED)
     return kind
 
 
-def _kind(folder: Path) -> Kind | None:
+def kind_of(folder: Path) -> Kind | None:
+    """Return what a folder is, None if it is nothing that a report can be made of."""
     return next((kind for kind, file in _MARKS.items() if (folder / file).is_file()), None)
 
 
@@ -164,7 +158,6 @@ def studies_near(
 
 
 def _study(folder: Path, kind: Kind) -> Study:
-    """Read the summary of a study."""
     path = folder / STUDIES[kind]
     content = read_json(path, mend="make the study again")
     model = SUMMARIES.get(kind, Summary)
@@ -178,5 +171,5 @@ def _near_folders(folder: Path) -> list[tuple[Kind, Path]]:
         places = sorted({around, *folder.resolve().iterdir(), *around.iterdir()})
     except OSError:
         return []
-    kinds = [(_kind(place), place) for place in places if place.is_dir()]
+    kinds = [(kind_of(place), place) for place in places if place.is_dir()]
     return [(kind, place) for kind, place in kinds if kind in STUDIES and kind is not None]

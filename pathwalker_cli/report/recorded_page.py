@@ -164,7 +164,6 @@ def _readings(folder: Path, who: str) -> list[Section]:
 
 
 def _strength_table(rows: Rows) -> Table:
-    """Return the maximum isometric torques beside those of the patient's file."""
     table_rows = tuple(
         Row((_muscles(row["generator"]), number(row, "strength", ".1f"),
              number(row, "patient file", ".1f"), number(row, "deviation", "+.0f"),

@@ -20,13 +20,10 @@ from pathwalker_cli.studies.verdict import Verdict, verdict_of_metrics
 
 @dataclass(frozen=True)
 class ReportRun:
-    """A converged run.
+    """A converged run beside the recordings.
 
-    Args:
-        label: What to call it: its condition, or its folder where several share that.
-        run: Its folder as it was read.
-        evaluation: Its gait beside the recordings.
-        verdict: What is known about its springs; None where nothing was judged.
+    Its label is its condition, or its folder where several share that; without a verdict nothing
+    was judged.
     """
 
     label: str

@@ -84,7 +84,6 @@ def _identified(run: ReportRun, name: str) -> float:
 
 
 def _row(run: ReportRun, name: str) -> Row:
-    """Return the row of one spring."""
     take, identified, verdict = recommended(run)[name], _identified(run, name), run.verdict
     spring = _judged(run, name)
     snapped = verdict.snapped.names.get(name, "") if verdict and verdict.snapped else ""

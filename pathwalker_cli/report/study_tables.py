@@ -118,7 +118,6 @@ def _moves(value: float | None) -> bool:
 
 
 def _perturbation(summary: PerturbationSummary) -> Section:
-    """Return what moved springs change."""
     rows = []
     for row in summary.rows:
         name = row.label if row.spring is None else measure_of(row.spring).label
@@ -237,7 +236,6 @@ def _uncertainty(
 
 
 def _learnt(summary: LearnSummary) -> Section:
-    """Return what the recordings say of body and cost, and what they do not."""
     own = summary.rms_own_cycles
     fit = ", ".join(
         f"{joint} {to_degrees(rms):.1f} ({to_degrees(own.get(joint, np.nan)):.1f})"

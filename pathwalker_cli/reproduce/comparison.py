@@ -80,13 +80,7 @@ _NOT_COMPUTED: Final[Reasons] = (
 
 @dataclass(frozen=True)
 class Ours:
-    """Our number, SI units: a value, or a range with its mean.
-
-    Args:
-        value: The value; of a range, its mean.
-        low: Lower end of a range, or None.
-        high: Upper end of a range, or None.
-    """
+    """Our number, SI units: a value, or a range with its mean."""
 
     value: float
     low: float | None = None
@@ -95,13 +89,9 @@ class Ours:
 
 @dataclass(frozen=True)
 class Row:
-    """One number of the article and ours.
+    """One number of the article and ours, or why there is none, and why the two differ.
 
-    Args:
-        number: What the article prints.
-        ours: Our number, or why there is none.
-        method: Method of inverse dynamics that gave it, "" for anything else.
-        why: Why the two differ, as far as it is known.
+    `method` is that of inverse dynamics, "" for anything else.
     """
 
     number: PaperNumber
@@ -158,12 +148,10 @@ def _ours(number: PaperNumber, results: Results, spreads: Spreads) -> Ours | str
 
 
 def _known(value: float | None, why: str) -> Ours | str:
-    """Return a value, or why there is none."""
     return f"not computed: {why}" if value is None else Ours(float(value))
 
 
 def _inverse(number: PaperNumber, result: InverseResult, results: Results) -> Ours | str:
-    """Return what one method of inverse dynamics says."""
     known = partial(_known, why="inverse dynamics gives none")
     name = number.quantity.removeprefix("max_isometric_torque_").removeprefix("residual_")
     if number.subject == "patient":
@@ -185,17 +173,15 @@ def _inverse(number: PaperNumber, result: InverseResult, results: Results) -> Ou
 
 
 def _gait(number: PaperNumber, result: ProblemResult) -> Ours | str:
-    """Return a number of a solved problem."""
     if result.evaluation is None:
-        return f"not computed: {result.problem} did not converge"
+        return f"not computed: {result.run.config.problem} did not converge"
     values = {row.measure.key: row.value for row in result.evaluation.rows}
-    values["seconds_solve"] = result.metrics["seconds_solve"]
-    values["walking_speed_weight"] = result.config.cost.walking_speed_weight
+    values["seconds_solve"] = result.run.metrics["seconds_solve"]
+    values["walking_speed_weight"] = result.run.config.cost.walking_speed_weight
     return _known(values.get(number.quantity), "the run does not tell")
 
 
 def _recorded(number: PaperNumber, results: Results, spreads: Spreads) -> Ours | str:
-    """Return what the recordings say."""
     condition = number.subject.removeprefix("recorded-")
     if number.quantity == "largest_deviation" and condition in spreads:
         return _largest_deviation(results.recorded["barefoot"])
@@ -227,7 +213,7 @@ def _why(number: PaperNumber, results: Results) -> str:
         return reason
     parts = [
         f"ours rests on its {bound.side} bound, {bound.value:.4g} {number.unit}"
-        for bound in result.bounds
+        for bound in result.run.result.bounds
         if bound.name == number.quantity
     ][:1]
     parts.append(reason)

@@ -105,14 +105,14 @@ def _kinds(
 def _series(result: ProblemResult) -> GaitSeries:
     """Return the stride of a converged problem."""
     if result.series is None:
-        raise ValueError(f"{result.problem} did not converge")
+        raise ValueError(f"{result.run.config.problem} did not converge")
     return result.series
 
 
 def _trace(result: ProblemResult) -> Trace:
     """Return the gait of a converged problem over the recordings."""
     if result.evaluation is None:
-        raise ValueError(f"{result.problem} did not converge")
+        raise ValueError(f"{result.run.config.problem} did not converge")
     gait = result.evaluation.gait
     return Trace(gait, gait.problem, result.evaluation.recorded)
 
@@ -211,6 +211,5 @@ def _draw(
 
 
 def _gait_handles() -> list[Artist]:
-    """Return the legend entries of the two gaits."""
     looks = {"MAPD-Barefoot": _BAREFOOT, "MAPD-Orthosis": _ORTHOSIS}
     return [style.entry(label, **look) for label, look in looks.items()]

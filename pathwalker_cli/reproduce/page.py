@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, Final
 
-from pathwalker_cli.conventions import COORDINATES, STIFFNESSES
 from pathwalker_cli.evaluation.evaluate import Change
 from pathwalker_cli.evaluation.paper import NUMBERS, PaperClaim, PaperNumber
 from pathwalker_cli.reproduce.comparison import Row, all_rows
@@ -21,6 +20,7 @@ from pathwalker_cli.reproduce.words import (
     subject,
     table,
 )
+from pathwalker_cli.results.text import interesting
 
 _HEAD: Final = (
     "Results of `pathwalker reproduce` beside those of Sreenivasa M, Millard M, Felis M, Mombaur "
@@ -172,10 +172,6 @@ def _change_lines(changes: Sequence[Change]) -> Iterator[str]:
 
 Metrics = Mapping[str, Any]
 
-_SHAPING: Final = frozenset({*COORDINATES[2:], *STIFFNESSES, "duration", "walking_speed",
-                             "distance"})  # fmt: skip
-"""Bounds that are choices which shape a gait: joint range, duration, speed, springs."""
-
 
 def _pair(form: str, *keys: str) -> Callable[[Metrics], str]:
     """Return what shows two metrics side by side."""
@@ -214,8 +210,7 @@ _GAIT: Final[dict[str, Callable[[Metrics], str]]] = {
 
 
 def _shaping_bounds(result: ProblemResult) -> list[str]:
-    """Return the active bounds that are choices which shape the gait."""
-    return [str(bound) for bound in result.bounds if bound.name in _SHAPING]
+    return [str(bound) for bound in result.run.result.bounds if interesting(bound)]
 
 
 def problem_lines(results: Results) -> Iterator[str]:
@@ -223,11 +218,11 @@ def problem_lines(results: Results) -> Iterator[str]:
     problems = results.problems
     rows = [("this call", *("kept" if each.kept else "solved now" for each in problems.values()))]
     for name, show in _SOLVE.items():
-        rows.append((name, *(show(each.metrics) for each in problems.values())))
+        rows.append((name, *(show(each.run.metrics) for each in problems.values())))
     counts = (str(len(_shaping_bounds(p))) if p.converged else "-" for p in problems.values())
     rows.append(("active bounds that shape the gait", *counts))
     for name, show in _GAIT.items():
-        shown = (show(each.metrics) if each.converged else "-" for each in problems.values())
+        shown = (show(each.run.metrics) if each.converged else "-" for each in problems.values())
         rows.append((name, *(text.replace("-, -", "-") for text in shown)))
     yield from table(("", *problems), rows)
     yield "\n*kept*: solved by an earlier call with the same config; its times are those of then."
@@ -240,19 +235,18 @@ def problem_lines(results: Results) -> Iterator[str]:
 def optima_lines(results: Results) -> Iterator[str]:
     """Yield where the starts of every problem ended, best first."""
     for name, each in results.problems.items():
-        optima = each.metrics.get("local_optima") or []
+        optima = each.run.metrics.get("local_optima") or []
         if not optima:
-            yield f"- {name}: one start ({each.metrics['start']})"
+            yield f"- {name}: one start ({each.run.metrics['start']})"
     for each in results.problems.values():
-        if each.metrics.get("local_optima"):
+        if each.run.metrics.get("local_optima"):
             yield from _optima(each)
 
 
 def _optima(result: ProblemResult) -> Iterator[str]:
-    """Yield the table of the local optima of one problem."""
-    optima = result.metrics["local_optima"]
+    optima = result.run.metrics["local_optima"]
     best = optima[0]["cost"]
-    yield f"\n{result.problem}, {len(optima)} starts:\n"
+    yield f"\n{result.run.config.problem}, {len(optima)} starts:\n"
     shares = [100.0 * (each["cost"] - best) / abs(best) if best and each["cost"] is not None
               else None for each in optima]  # fmt: skip
     rows = [

@@ -26,7 +26,6 @@ from pathwalker_cli.reproduce.results import (
     recordings,
 )
 from pathwalker_cli.results.run_folder import check_target
-from pathwalker_cli.studies.base import check_folder
 from pathwalker_cli.studies.run import done_run
 from pathwalker_cli.versions import versions
 
@@ -96,8 +95,7 @@ def reproduce(
 
 
 def _check(folder: Path) -> None:
-    """Refuse a folder that cannot take the results, before anything is computed."""
-    check_folder(folder, ENTRIES, "reproduce")
+    """Refuse a claimed folder that cannot take the results, before anything is computed."""
     for place in (folder / name for name in ENTRIES - {PAGE}):
         if place.exists() and not place.is_dir():
             raise DataError("is a file, not a folder", where=str(place), mend="remove it")
@@ -135,5 +133,4 @@ def _solved(folder: Path, studies: Mapping[str, Case], solve: Solve, say: Say) -
 
 
 def _line(name: str, state: str, began: float) -> str:
-    """Return the line of a step."""
     return f"{name:<28}{state:<20}{time.perf_counter() - began:8.1f} s"

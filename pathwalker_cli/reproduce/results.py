@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from pathwalker_cli import __version__
-from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import CONDITIONS, Condition
 from pathwalker_cli.evaluation.evaluate import Change, Evaluation, changes_between, evaluate_gait
 from pathwalker_cli.evaluation.paper import PATIENT
@@ -20,9 +19,8 @@ from pathwalker_cli.inverse.study import InverseDynamicsConfig, load_inverse_dyn
 from pathwalker_cli.inverse.trials import dynamics_trials
 from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import Patient, load_patient
-from pathwalker_cli.results.run_folder import load_run
+from pathwalker_cli.results.run_folder import Run, load_run
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import stride_of
 
@@ -119,22 +117,12 @@ def _read(file: Path, key: dict[str, Any]) -> InverseResult | None:
 
 @dataclass(frozen=True)
 class ProblemResult:
-    """How a problem ended.
+    """The run of a problem, and whether it was solved before and not again.
 
-    Args:
-        problem: Its name.
-        metrics: Content of `metrics.json`.
-        bounds: Bounds that hold the solution back.
-        config: The config that was solved.
-        kept: Whether it was solved before and not again.
-        series: The stride, None if it did not converge.
-        evaluation: The stride beside the recordings, None if it did not converge.
+    If it converged, with its stride, also beside the recordings.
     """
 
-    problem: str
-    metrics: Mapping[str, Any]
-    bounds: tuple[ActiveBound, ...]
-    config: StudyConfig
+    run: Run
     kept: bool
     series: GaitSeries | None = None
     evaluation: Evaluation | None = None
@@ -147,14 +135,7 @@ class ProblemResult:
 
 @dataclass(frozen=True)
 class Results:
-    """Everything that was computed.
-
-    Args:
-        problems: The problems by name, in order.
-        inverse: By method of inverse dynamics, its result, or why there is none.
-        recorded: The recordings by condition.
-        quick: Whether the solves were quick checks on coarse meshes.
-    """
+    """Everything that was computed: in place of an inverse dynamics result, why there is none."""
 
     problems: Mapping[str, ProblemResult]
     inverse: Mapping[str, InverseResult | str]
@@ -188,12 +169,9 @@ def evaluated(
 ) -> ProblemResult:
     """Return the result that a run folder holds."""
     run = load_run(folder, allow_unconverged=True)
-    config, metrics = run.config, run.metrics
-    result = ProblemResult(config.problem, metrics, run.result.bounds, config, kept)
-    if metrics["status"] != "converged":
-        return result
-    series = gait_series(run.case.walker(), run.motion)
-    gait = stride_of(series, config.problem, config.problem)
-    theirs = recorded.get(config.condition) if run.case.patient.id == PATIENT else None
-    evaluation = evaluate_gait(gait, recorded=theirs)
-    return replace(result, series=series, evaluation=evaluation)
+    if run.metrics["status"] != "converged":
+        return ProblemResult(run, kept)
+    series, problem = gait_series(run.case.walker(), run.motion), run.config.problem
+    theirs = recorded.get(run.config.condition) if run.case.patient.id == PATIENT else None
+    evaluation = evaluate_gait(stride_of(series, problem, problem), recorded=theirs)
+    return ProblemResult(run, kept, series, evaluation)

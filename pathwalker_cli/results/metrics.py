@@ -107,10 +107,8 @@ class RunMetrics(BaseModel):
 class RunInputs:
     """What a run was made from, taken before the solve: an earlier run may change meanwhile.
 
-    Args:
-        hashes: SHA-256 of the resolved config, of the patient's file, of what is kept of the
-            patient, and of an earlier motion.
-        warm_start: Run that it began with; "" without one.
+    SHA-256 of the resolved config, of the patient's file, of what is kept of the patient, and of
+    the motion of the run that it began with, if there is one.
     """
 
     hashes: Mapping[str, str]
@@ -131,28 +129,6 @@ def run_inputs(case: Case, warm_start: str | Path | None = None) -> RunInputs:
     if warm_start is not None:
         hashes["warm_start"] = sha256((Path(warm_start) / "motion.npz").read_bytes())
     return RunInputs(hashes, "" if warm_start is None else str(warm_start))
-
-
-def stiffness_ranges(solution: GaitSolution) -> dict[str, tuple[float, float]]:
-    """Return the range of every free stiffness [N m/rad]; empty when barefoot."""
-    ranges = {name: solution.bounds.table.find(name) for name in STIFFNESSES}
-    return {name: pair for name, pair in ranges.items() if pair is not None}
-
-
-def unknowns(solution: GaitSolution) -> list[dict[str, Any]]:
-    """Return every number that was free to choose: name, place, value, unit and range."""
-    return [
-        {
-            "name": unknown.name,
-            "place": unknown.address,
-            "value": value,
-            "unit": unknown.unit,
-            "range": solution.bounds.ranges[unknown.name],
-        }
-        for unknown, value in zip(
-            solution.walker.unknowns, solution.last_motion.parameters.tolist(), strict=True
-        )
-    ]
 
 
 def metrics_hash(metrics: Mapping[str, Any]) -> str:
@@ -196,7 +172,7 @@ def _outcome(solution: GaitSolution) -> dict[str, Any]:
 
 def _proof(solution: GaitSolution) -> dict[str, Any]:
     """Return what speaks for the result, and what held it back."""
-    errors, worst = solution.reintegration, solution.violations[0]
+    errors, worst, bounds = solution.reintegration, solution.violations[0], solution.bounds
     return {
         "largest_violation": worst.amount,
         "largest_violation_name": worst.name,
@@ -210,9 +186,22 @@ def _proof(solution: GaitSolution) -> dict[str, Any]:
         "shortfall": None if solution.shortfall is None else solution.shortfall.as_dict(),
         "active_bounds": [str(bound) for bound in solution.active],
         "active": [asdict(bound) for bound in solution.active],
-        "stiffness_ranges": stiffness_ranges(solution),
-        "unknowns": unknowns(solution),
-        "bound_sources": solution.bounds.sources,
+        "stiffness_ranges": {
+            name: pair for name in STIFFNESSES if (pair := bounds.table.find(name)) is not None
+        },
+        "unknowns": [
+            {
+                "name": unknown.name,
+                "place": unknown.address,
+                "value": value,
+                "unit": unknown.unit,
+                "range": bounds.ranges[unknown.name],
+            }
+            for unknown, value in zip(
+                solution.walker.unknowns, solution.last_motion.parameters.tolist(), strict=True
+            )
+        ],
+        "bound_sources": bounds.sources,
         "notes": solution.walker.patient.notes,
     }
 

@@ -63,14 +63,9 @@ ENTRIES: Final = frozenset(
 
 @dataclass(frozen=True)
 class Run:
-    """A run as it was read back.
+    """A run as it was read back: metrics, the exact motion, and the case that the folder keeps.
 
-    Args:
-        folder: Where it stands.
-        metrics: Content of `metrics.json`, by key.
-        motion: The exact motion.
-        case: The config with all defaults filled in, and the patient that the folder keeps.
-        multipliers: Multipliers of the solution by collocation; None if they were not kept.
+    Multipliers are those of a solution by collocation; None if they were not kept.
     """
 
     folder: Path
@@ -338,7 +333,6 @@ def _file(folder: Path, name: str) -> Path:
 
 
 def _read_metrics(folder: Path) -> dict[str, Any]:
-    """Return the metrics of a run."""
     path = _file(folder, _METRICS)
     metrics = read_json(path, mend="solve again")
     if "run_format" not in metrics:

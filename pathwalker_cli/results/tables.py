@@ -92,7 +92,6 @@ def _columns(
 
 
 def _table(series: GaitSeries, *groups: list[Column]) -> Trajectory:
-    """Return columns as a trajectory."""
     names, units, values = zip(*(column for group in groups for column in group), strict=True)
     return Trajectory(series.time, names, np.column_stack(values), units)
 

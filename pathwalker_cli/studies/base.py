@@ -49,13 +49,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Plan:
-    """What a study would do.
-
-    Args:
-        does: In words.
-        solves: Number of neighbours that are solved.
-        least: Whether there may be more.
-    """
+    """What a study would do, in words, and how many neighbours it would solve, or at least."""
 
     does: str
     solves: int
@@ -214,7 +208,6 @@ def planned(
 
 
 def _given(study: NeighbourStudy, folder: Path) -> Run:
-    """Return the run that was named."""
     if study.set:
         raise ConfigError(
             "overrides values of the base, but --run brings a config of its own",

@@ -37,13 +37,7 @@ Solve = Callable[[str, Values, End | None], End]
 
 @dataclass(frozen=True)
 class Graph:
-    """Points and who is whose neighbour.
-
-    Args:
-        points: Values of every point by its name, in order.
-        edges: Pairs of neighbours.
-        root: The point that is solved already.
-    """
+    """Points by name, in order, and who is whose neighbour; the root is solved already."""
 
     points: Mapping[str, Values]
     edges: tuple[tuple[str, str], ...]
@@ -99,13 +93,7 @@ class Rules(Generic[End]):
 
 @dataclass(frozen=True)
 class Attempt(Generic[End]):
-    """One solve.
-
-    Args:
-        name: Its name, unique in the exploration.
-        point: The point that it was made for.
-        end: Where it ended.
-    """
+    """One solve, for a point; its name is unique in the exploration."""
 
     name: str
     point: str
@@ -114,13 +102,9 @@ class Attempt(Generic[End]):
 
 @dataclass(frozen=True)
 class Branch(Generic[End]):
-    """A local optimum of a point.
+    """A local optimum of a point: where so many solves ended, one of them of this name.
 
-    Args:
-        number: Its number at the point, in the order in which they turned up, from 0.
-        name: Name of the solve.
-        end: The solution.
-        times: How many solves ended there.
+    Its number at the point counts from 0, in the order in which they turned up.
     """
 
     number: int
@@ -131,13 +115,9 @@ class Branch(Generic[End]):
 
 @dataclass(frozen=True)
 class Exploration(Generic[End]):
-    """All local optima of all points.
+    """All local optima of all points, best first, none where every solve failed; and every solve.
 
-    Args:
-        branches: By point, best first; none where every solve failed.
-        attempts: Every solve, those at points in between and those that failed too.
-        sweeps: Sweeps that were made.
-        complete: Whether the last sweep found nothing new.
+    It is complete if the last sweep found nothing new.
     """
 
     branches: dict[str, tuple[Branch[End], ...]]
@@ -280,7 +260,6 @@ class _Explorer(Generic[End]):
         return all(self.rules.distance(from_[0].end, branch.end) > limit for branch in to)
 
     def _distances(self) -> Iterator[float]:
-        """Yield how far neighbours lie apart."""
         for pair in self.graph.edges:
             one, other = (self.ranked(point) for point in pair)
             if one and other:

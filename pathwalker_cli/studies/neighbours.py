@@ -117,14 +117,8 @@ def _read(path: Path, seal: str) -> NlpResult | None:
         return None
 
 
-class Neighbours:
-    """Solves neighbours of a run and keeps them in a folder.
-
-    Args:
-        run: The run.
-        folder: Where they are kept.
-        max_iterations: Largest number of iterations of one solve.
-        report: Is given a line for every neighbour.
+class Neighbours(Journal):
+    """Solves neighbours of a run in so many iterations at most, and reports each in a line.
 
     Raises:
         NotConvergedError: If the run itself cannot be solved again.
@@ -136,20 +130,21 @@ class Neighbours:
         self.run = run
         self._report = report
         limited = run.case.with_values({"solver.max_iterations": max_iterations})
-        resolver = resolver_of(replace(run, case=limited))
-        self._journal = Journal(folder, run, resolver)
-        self.optimum = require_optimum(resolver, run, limited.config.solver.tolerance)
+        super().__init__(folder, run, resolver_of(replace(run, case=limited)))
+        self.optimum = require_optimum(self.resolver, run, limited.config.solver.tolerance)
         """The run as an optimum, solved to its tolerance."""
         self._count = 0
 
-    def resolve(self, name: str, case: Case, start: Optimum | None) -> Optimum:
+    def resolve(
+        self, name: str, case: Case, start: Optimum | None = None, insist: bool = True
+    ) -> Optimum:
         """Return a neighbour, read or solved now; see `Journal.resolve`."""
-        solved = self._journal.solved
-        optimum = self._journal.resolve(name, case, start)
+        solved = self.solved
+        optimum = super().resolve(name, case, start, insist)
         self._count += 1
         result = optimum.result
         how = f"{result.iterations} iterations, {result.seconds:.1f} s"
-        how = how if self._journal.solved > solved else f"{how}, kept from before"
+        how = how if self.solved > solved else f"{how}, kept from before"
         outcome = f"cost {optimum.cost:.5g}" if optimum.converged else result.status
         self._report(f"{self._count:4d}  {name:<24} {outcome}, {how}")
         return optimum
@@ -198,7 +193,7 @@ def solve_all(
     folder: Path,
     tolerance: float,
     workers: int,
-    report: Callable[[Solved], None],
+    report: Callable[[int, Solved], None],
 ) -> list[Solved]:
     """Return solved neighbours by rising name; every one starts from the run itself.
 
@@ -210,15 +205,15 @@ def solve_all(
         folder: Folder of the journal.
         tolerance: Optimality tolerance.
         workers: Processes; with one, this process does it.
-        report: Hears of every one as they come.
+        report: Hears of every one as they come, counted from 1.
 
     Raises:
         NotConvergedError: If the user stopped it, or a process was ended from outside.
     """
     source = _solved_here if min(workers, len(cases)) == 1 else _solved_elsewhere
     ends = []
-    for solved in source(cases, (run, folder, tolerance), workers):
-        report(solved)
+    for done, solved in enumerate(source(cases, (run, folder, tolerance), workers), start=1):
+        report(done, solved)
         ends.append(solved)
     return sorted(ends, key=lambda solved: solved.name)
 
@@ -233,7 +228,6 @@ def _journal(origin: _Origin) -> Journal:
 
 
 def _solved(journal: Journal, name: str, case: Case) -> Solved:
-    """Solve one neighbour."""
     before = journal.solved
     optimum = journal.resolve(name, case)
     values = measures(optimum) if optimum.converged else {}
@@ -249,7 +243,6 @@ def _solved_here(cases: Mapping[str, Case], origin: _Origin, workers: int) -> It
 
 
 def _solved_elsewhere(cases: Mapping[str, Case], origin: _Origin, workers: int) -> Iterator[Solved]:
-    """Yield what other processes solve."""
     calls = [(origin, name, case) for name, case in cases.items()]
     try:
         yield from results_of_calls(_in_worker, calls, workers)

@@ -16,15 +16,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StudyEntry:
-    """A study by what people see of it.
+    """A study by what people see of it, and the module where its `STUDY` stands.
 
-    Args:
-        name: Its name: that of its shipped config, of its summary and of the folder of its results.
-        title: What it is for, in one line of the list of commands.
-        help: What its command says of itself.
-        heading: Heading of the keys of its config in the reference.
-        module: Where its `STUDY` stands.
-        parallel: Whether processes share its solves.
+    Its name is that of its shipped config, of its summary and of the folder of its results;
+    `heading` is that of the keys of its config in the reference. Processes may share its solves.
     """
 
     name: str

@@ -32,13 +32,7 @@ SAME_RUN: Final = "earlier run of the same problem"
 
 
 class Outcome(NamedTuple):
-    """How a study ended.
-
-    Args:
-        solution: How the solve ended.
-        metrics: The metrics as they were written.
-        verdict: How sure the springs are; None where there is nothing to judge.
-    """
+    """How a study ended, its metrics as written, and how sure springs are that were judged."""
 
     solution: GaitSolution
     metrics: dict[str, Any]

@@ -40,15 +40,7 @@ _SHOOTING: Final = "solved by multiple shooting: its run folder holds a descript
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that was checked.
-
-    Args:
-        name: What.
-        value: What was found; None where it does not apply.
-        limit: What is allowed.
-        unit: Unit of both, "" for a count.
-        note: What differs, or why it does not apply.
-    """
+    """One thing that was checked; without a value it does not apply, and the note says why."""
 
     name: str
     value: float | None
@@ -64,14 +56,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Verification:
-    """All checks of a run, or of the table of a study.
-
-    Args:
-        folder: Its folder.
-        problem: Its problem, or what it is.
-        patient: Id of its patient; "" if there are several.
-        checks: The checks.
-    """
+    """All checks of a run, or of the table of a study, which has no patient."""
 
     folder: Path
     problem: str
@@ -184,41 +169,26 @@ def _numbers(run: Run, solver: GaitSolver, numbers: dict[str, Any]) -> Iterator[
         made |= {"cost_terms": terms, "cost": sum(terms.values())}
     if "goals" in metrics:
         made["goals"] = goal_values(run.motion, solver.walker, ranges)
-    pairs = ((".".join(key), _apart(_at(metrics, key), value)) for key, value in _flat(made))
-    yield _largest("metrics.json", pairs)
+    yield _largest("metrics.json", _differences(metrics, made))
 
 
-def _flat(content: Any, key: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """Yield every single value with its place."""
-    if isinstance(content, Mapping):
-        for name, entry in content.items():
-            yield from _flat(entry, (*key, str(name)))
-    elif isinstance(content, list | tuple):
-        for i, entry in enumerate(content):
-            yield from _flat(entry, (*key, str(i)))
+def _differences(kept: Any, made: Any, place: str = "") -> Iterator[tuple[str, float]]:
+    """Yield the place of every value that was made anew, and its relative difference.
+
+    It is infinite if only one is a number.
+    """
+    if isinstance(made, Mapping | list | tuple):
+        entries = made.items() if isinstance(made, Mapping) else enumerate(made)
+        for name, entry in entries:
+            try:
+                other = kept[name]
+            except (LookupError, TypeError):
+                other = None
+            yield from _differences(other, entry, f"{place}.{name}".lstrip("."))
+    elif isinstance(kept, int | float) and isinstance(made, int | float):
+        yield place, abs(kept - made) / max(abs(kept), abs(made), 1e-3)
     else:
-        yield key, content
-
-
-def _at(content: Any, key: tuple[str, ...]) -> Any:
-    """Return the value at a place, None where there is none."""
-    for name in key:
-        if isinstance(content, list) and name.isdigit() and int(name) < len(content):
-            content = content[int(name)]
-        elif isinstance(content, Mapping):
-            content = content.get(name)
-        else:
-            return None
-    return content
-
-
-def _apart(one: Any, two: Any) -> float:
-    """Return the relative difference of two values; infinite if only one is a number."""
-    numbers = [isinstance(value, int | float) for value in (one, two)]
-    if all(numbers):
-        size = max(abs(one), abs(two), 1e-3)
-        return float(abs(one - two) / size)
-    return 0.0 if one == two else math.inf
+        yield place, 0.0 if kept == made else math.inf
 
 
 def _dynamics(run: Run, series: GaitSeries, numbers: dict[str, Any]) -> Iterator[Check]:

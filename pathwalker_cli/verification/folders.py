@@ -59,7 +59,6 @@ def _status(run: Path) -> str:
 
 
 def _entries(folder: Path) -> list[Path]:
-    """Return the folders in a folder, in order; hidden ones are on their way."""
     if not folder.is_dir():
         return []
     return sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -39,8 +38,10 @@ def difference_lines(before: Run, after: Run) -> Iterator[str]:
     versions = [
         run.metrics["versions"] | {"kernels": run.metrics.get("kernels")} for run in (before, after)
     ]
-    for name in _different(*versions):
-        yield f"{name}: {versions[0].get(name)} before, {versions[1].get(name)} now"
+    for name in sorted({*versions[0], *versions[1]}):
+        then, now = (each.get(name) for each in versions)
+        if then != now:
+            yield f"{name}: {then} before, {now} now"
     if before.metrics["motion_hash"] == after.metrics["motion_hash"]:
         yield "the motion is the same to the last bit"
         return
@@ -55,7 +56,3 @@ def difference_lines(before: Run, after: Run) -> Iterator[str]:
         yield f"states differ by {apart:.2e} rad, m, rad/s or m/s at most"
     else:
         yield f"{before.motion.intervals} mesh intervals before, {after.motion.intervals} now"
-
-
-def _different(one: Mapping[str, Any], two: Mapping[str, Any]) -> list[str]:
-    return [name for name in sorted({*one, *two}) if one.get(name) != two.get(name)]

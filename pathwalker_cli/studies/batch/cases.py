@@ -34,15 +34,9 @@ _QUIET: Final = {"figures": "none"}
 
 @dataclass(frozen=True)
 class BatchCase:
-    """One patient in one problem with its overrides.
+    """One patient in one problem with its overrides; its run folder has its name.
 
-    Args:
-        name: Its name, and that of its run folder.
-        problem: Name of the problem in the study.
-        study: What is solved, and for whom.
-        values: What the grid varies, by dotted key.
-        variant: Name of the overrides that belong together; "" without.
-        warm_start: Run to begin with.
+    `values` is what the grid varies, by dotted key; `variant` names overrides that belong together.
     """
 
     name: str
@@ -77,7 +71,7 @@ def load_cases(path: str | Path, changes: tuple[str, ...] = ()) -> Batch:
     folders = {key: place_of(key, source, changes) for key in ("patients", "problems")}
     patients = listed_patients(study.patients, folders["patients"], source, where)
     problems = {
-        name: overridden(config, _QUIET | study.set, f"{where}, set, problem {name}")
+        name: with_values(config, flat(_QUIET | study.set), f"{where}, set, problem {name}")
         for name, config in listed_problems(study.problems, folders["problems"], where).items()
     }
     warm_starts = _warm_starts(study, problems, source, where)
@@ -93,26 +87,6 @@ def load_cases(path: str | Path, changes: tuple[str, ...] = ()) -> Batch:
     return Batch(source.stem, tuple(cases.values()))
 
 
-def overridden(config: StudyConfig, values: Mapping[str, Any], where: str) -> StudyConfig:
-    """Return a config with overrides by dotted key.
-
-    What follows "variation.scale." or "variation.shift." is one place in the patient's file.
-
-    Raises:
-        ConfigError: If a key does not exist or a value is refused.
-    """
-    plain: dict[str, Any] = {}
-    for key, value in flat(values).items():
-        block, kind, place = (*key.split(".", 2), "", "")[:3]
-        if block != "variation" or not place:
-            plain[key] = value
-            continue
-        whole = f"{block}.{kind}"
-        before = plain.get(whole, getattr(config.variation, kind, {}))
-        plain[whole] = {**before, place: value} if isinstance(before, Mapping) else before
-    return with_values(config, plain, where) if plain else config
-
-
 def _variants(study: BatchStudy, problem: str, base: Case, where: str) -> Iterator[BatchCase]:
     """Yield all cases of one patient in one problem."""
     short = short_keys(study.grid)
@@ -123,7 +97,7 @@ def _variants(study: BatchStudy, problem: str, base: Case, where: str) -> Iterat
             shown = {short[key]: value for key, value in values.items()}
             name = case_name(base.unvaried.id, problem, shown, label)
             changes = {**values, **flat(variant.set)}
-            config = overridden(base.config, changes, f"{where}, case {name}")
+            config = with_values(base.config, flat(changes), f"{where}, case {name}")
             yield BatchCase(name, problem, replace(base, config=config), values, label)
 
 

@@ -26,9 +26,7 @@ _DISCONNECTED: Final = "the connection to the scheduler was lost"
 class DaskPool:
     """Workers of a Dask scheduler; Dask hands the case of a lost worker to another one.
 
-    Args:
-        client: Connection to the scheduler.
-        workers: Number of workers; None if it changes.
+    Their number is None if it changes.
     """
 
     def __init__(self, client: Any, workers: int | None = None) -> None:

@@ -139,13 +139,9 @@ SIGHT: Final = 10.0
 
 @dataclass(frozen=True)
 class Ended:
-    """How a case ended.
+    """How a case ended: "converged", or why not.
 
-    Args:
-        case: The case.
-        status: "converged", or why not.
-        metrics: Content of its `metrics.json`; None if there is no run.
-        seconds: Wall time [s]; 0 if it was there already.
+    There are no metrics without a run; the wall time [s] is 0 if it was there already.
     """
 
     case: BatchCase

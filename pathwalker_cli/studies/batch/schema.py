@@ -11,14 +11,12 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, field_validator, model_validator
 
-from pathwalker_cli.config import StudyConfig, apply_change, read_config
+from pathwalker_cli.config import StudyConfig, read_config
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.io.fields import YamlModel, invalid
-from pathwalker_cli.io.refusals import KeyPath
-from pathwalker_cli.io.yaml_file import read_value
 
-_DOTTED: Final = ("set", "grid", "warm_start")
-"""Keys whose own keys may hold dots."""
+_DOTTED: Final = (("set",), ("grid",), ("warm_start",))
+"""Mappings whose keys have dots."""
 
 _LISTED: Final = {"problem": "problems", "patient": "patients"}
 """Keys of a config that every case brings along, and where they are listed."""
@@ -88,28 +86,17 @@ def load_batch(path: str | Path, changes: tuple[str, ...] = ()) -> tuple[BatchSt
     Raises:
         ConfigError: If file or overrides are wrong.
     """
-    study, source = read_config(path, BatchStudy, changes, _apply)
+    for change in changes:
+        head = change.partition("=")[0].strip().partition(".")[0]
+        if head in StudyConfig.model_fields and head not in BatchStudy.model_fields:
+            raise ConfigError(
+                f"'{head}' is no key of a study of many cases",
+                where=f"--set {change}",
+                allowed=", ".join(BatchStudy.model_fields),
+                mend=f"for a value of every case: --set set.{change}",
+            )
+    study, source = read_config(path, BatchStudy, changes, _DOTTED)
     return study, source.resolve()
-
-
-def _apply(mapping: dict[str, Any], change: str) -> KeyPath:
-    """Put one override into the content of the file; return the key that it changes."""
-    key, equals, text = change.partition("=")
-    head, dot, rest = key.strip().partition(".")
-    if equals and head in StudyConfig.model_fields and head not in BatchStudy.model_fields:
-        raise ConfigError(
-            f"'{head}' is no key of a study of many cases",
-            where=f"--set {change}",
-            allowed=", ".join(BatchStudy.model_fields),
-            mend=f"for a value of every case: --set set.{change}",
-        )
-    if not (equals and dot and head in _DOTTED):
-        return apply_change(mapping, change)
-    holder = mapping.setdefault(head, {})
-    if not isinstance(holder, dict):
-        raise ConfigError(f"'{head}' holds no keys", where=f"--set {change}")
-    holder[rest] = read_value(text, f"--set {change}")
-    return head, rest
 
 
 _SEPARATOR: Final = "--"

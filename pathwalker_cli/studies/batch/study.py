@@ -127,7 +127,6 @@ _HEAD: Final = ("case", "cost", "speed [m/s]", "K_D right, left [N m/rad]", "K_P
 
 
 def _row(ended: Ended) -> tuple[str, ...]:
-    """Return the cells of a converged case."""
     metrics = ended.metrics or {}
     pairs = (_pair(metrics, stem) for stem in ("dorsiflexion", "plantarflexion"))
     speed = _shown(metrics.get("walking_speed"), ".3f")

@@ -48,14 +48,7 @@ class Result(TypedDict):
 
 @dataclass(frozen=True)
 class Task:
-    """One case, as it travels.
-
-    Args:
-        name: Name of the case.
-        case: Its config and its patient.
-        folder: Full path of its run folder.
-        warm_start: Full path of the run to begin with; "" without.
-    """
+    """One case, as it travels: with full paths of run folder and run to begin with, "" for none."""
 
     name: str
     case: Case
@@ -126,12 +119,7 @@ NO_WORKERS: Final = "the workers died before they could begin; did memory run ou
 
 
 class LocalPool:
-    """Processes on this machine.
-
-    Args:
-        workers: Their number.
-        time_limit: Longest time of a case [s]; None without.
-    """
+    """Processes on this machine, with the longest time of a case [s]; None without."""
 
     def __init__(self, workers: int, time_limit: float | None = None) -> None:
         self.workers: int | None = workers
@@ -161,7 +149,6 @@ class LocalPool:
             yield name, failure(LOST, detail)
 
     def _result(self, future: Future[Result]) -> Result:
-        """Return what a worker handed back."""
         try:
             return future.result()
         except (ProcessExpired, BrokenProcessPool):

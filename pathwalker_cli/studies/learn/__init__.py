@@ -45,7 +45,6 @@ from pathwalker_cli.studies.learn.fit import (
 from pathwalker_cli.studies.learn.result import (
     FILES,
     LearnResult,
-    learn_content,
     learn_lines,
     left_out_errors,
     write_learnt,
@@ -251,7 +250,7 @@ STUDY: Final = StudyKind(
     plan=plan,
     run=learn,
     write=_write,
-    content=learn_content,
+    content=lambda result: result.content,
     lines=learn_lines,
     predicts=True,
     whole_cycle=True,

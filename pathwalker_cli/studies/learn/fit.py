@@ -31,15 +31,8 @@ _DIGITS: Final = 9
 class Learner:
     """Predictions for numbers, counted in prior standard deviations from their priors.
 
-    Args:
-        numbers: What is thought of every number that is learnt, by place.
-        case: The problem.
-        targets: What its strides are held against.
-        resolver: Solves neighbours of the first prediction.
-        journal: Keeps what was solved.
-        report: Hears of every step.
-        name: Beginning of the names in the journal.
-        begin: The prediction to begin with; the first one if left out.
+    The resolver solves neighbours of the first prediction, the journal keeps them under names that
+    begin with `name`; without `begin`, the first prediction is the one to begin with.
     """
 
     numbers: Mapping[str, Prior]

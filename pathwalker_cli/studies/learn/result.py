@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -59,20 +60,8 @@ class LeftOut:
 class LearnResult:
     """A set of learnt numbers beside the recordings that it comes from.
 
-    Args:
-        problem: The problem whose numbers they are.
-        learnt: The numbers.
-        stride: The stride that they predict.
-        recorded: The recordings.
-        targets: What the stride was held against.
-        misfits: What was minimised, by start.
-        prior_misfit: What of it is distance from the priors.
-        active: Ranges that hold the result; none should.
-        left_out: Leave-one-trial-out errors; None with a single trial.
-        solves: Predictions that were solved.
-        iterations: Iterations of all of them.
-        seconds: Wall seconds after the first prediction.
-        cpu_seconds: CPU seconds of this process after the first prediction.
+    `misfits` is what was minimised, by start; of it, `prior_misfit` is distance from the priors.
+    `active` ranges hold the result; none should. Seconds count after the first prediction.
     """
 
     problem: str
@@ -89,21 +78,50 @@ class LearnResult:
     seconds: float
     cpu_seconds: float
 
-    @property
-    def told(self) -> dict[str, float]:
-        """Share of each prior's variance that the recordings took away, by place, in [0, 1]."""
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """Everything as plain values, SI units; files and terminal tell what stands here."""
+        own = recorded_rms_mean_cycle(self.recorded)
+        walk = {key: measure_of(key).of(self.stride) for key in _JUDGED}
+        recorded = recorded_numbers(self.recorded)
+        return {
+            "problem": self.problem,
+            "patient": self.learnt.patient,
+            "condition": self.learnt.condition,
+            "misfits": list(self.misfits),
+            "prior_misfit": self.prior_misfit,
+            "rms_mean_cycle": rms_mean_cycle(self.stride, self.recorded),
+            "rms_own_cycles": {joint: spread.mean for joint, spread in own.items()},
+            "force_rms": force_rms(self.stride, self.recorded),
+            "left_out": None if self.left_out is None else vars(self.left_out),
+            "walk": {
+                key: {"learnt": value, "recorded": None if (r := recorded.get(key)) is None else
+                      [r.low, r.mean, r.high]}
+                for key, value in walk.items()
+                if value is not None
+            },
+            "numbers": dict(self._numbers()),
+            "active_bounds": list(self.active),
+            "solves": self.solves,
+            "iterations": self.iterations,
+            "seconds": self.seconds,
+            "seconds_cpu": self.cpu_seconds,
+        }  # fmt: skip
+
+    def _numbers(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        """Yield every number by its place, with the values one standard deviation away.
+
+        What it is told is the share of its prior's variance that the recordings took away.
+        """
         left = np.diag(np.array(self.learnt.covariance))
-        return {place: float(1.0 - v) for place, v in zip(self.learnt.numbers, left, strict=True)}
+        for (place, number), variance in zip(self.learnt.numbers.items(), left, strict=True):
+            told = float(1.0 - variance)
+            at, deviation = number.deviations(number.learnt), float(np.sqrt(1.0 - told))
+            interval = [number.value(at + sign * deviation) for sign in (-1.0, 1.0)]
+            yield place, {"learnt": number.learnt, "prior": number.prior, "unit": self._unit(place),
+                          "interval": interval, "told": told}  # fmt: skip
 
-    def interval(self, place: str) -> tuple[float, float]:
-        """Return the values one standard deviation below and above a learnt one [its unit]."""
-        number = self.learnt.numbers[place]
-        deviation = float(np.sqrt(1.0 - self.told[place]))
-        at = number.deviations(number.learnt)
-        low, high = (number.value(at + sign * deviation) for sign in (-1.0, 1.0))
-        return low, high
-
-    def unit(self, place: str) -> str:
+    def _unit(self, place: str) -> str:
         """Return the unit of a number."""
         if place.startswith(COST):
             goal = GOALS.get(place.rpartition(".")[2])
@@ -186,71 +204,38 @@ def write_learnt(result: LearnResult, folder: Path) -> None:
     header = ["number", "unit", "learnt", "one deviation below", "one deviation above", "prior",
               "told by recordings [1]"]  # fmt: skip
     rows = [
-        [place, result.unit(place), number.learnt, *result.interval(place), number.prior,
-         result.told[place]]
-        for place, number in result.learnt.numbers.items()
+        [place, number["unit"], number["learnt"], *number["interval"], number["prior"],
+         number["told"]]
+        for place, number in result.content["numbers"].items()
     ]  # fmt: skip
     write_table(folder / FILES[1], header, rows)
-    write_json(folder / FILES[2], learn_content(result))
-
-
-def learn_content(result: LearnResult) -> dict[str, Any]:
-    """Return a result as plain values, SI units."""
-    own = recorded_rms_mean_cycle(result.recorded)
-    recorded = recorded_numbers(result.recorded)
-    left = result.left_out
-    return {
-        "problem": result.problem,
-        "patient": result.learnt.patient,
-        "condition": result.learnt.condition,
-        "misfits": list(result.misfits),
-        "prior_misfit": result.prior_misfit,
-        "rms_mean_cycle": rms_mean_cycle(result.stride, result.recorded),
-        "rms_own_cycles": {joint: spread.mean for joint, spread in own.items()},
-        "force_rms": force_rms(result.stride, result.recorded),
-        "left_out": None if left is None else vars(left),
-        "walk": {
-            key: {"learnt": value, "recorded": None if (r := recorded.get(key)) is None else
-                  [r.low, r.mean, r.high]}
-            for key, value in _walk(result.stride).items()
-        },
-        "numbers": {
-            place: {"learnt": number.learnt, "prior": number.prior, "unit": result.unit(place),
-                    "interval": list(result.interval(place)), "told": result.told[place]}
-            for place, number in result.learnt.numbers.items()
-        },
-        "active_bounds": list(result.active),
-        "solves": result.solves,
-        "iterations": result.iterations,
-        "seconds": result.seconds,
-        "seconds_cpu": result.cpu_seconds,
-    }  # fmt: skip
-
-
-def _walk(stride: Stride) -> dict[str, float]:
-    values = {key: measure_of(key).of(stride) for key in _JUDGED}
-    return {key: value for key, value in values.items() if value is not None}
+    write_json(folder / FILES[2], result.content)
 
 
 def learn_lines(result: LearnResult) -> Iterator[str]:
     """Yield a result as lines for the terminal."""
-    yield from _fit_lines(result)
-    yield from _walk_lines(result)
+    content = result.content
+    yield from _fit_lines(content)
+    yield f"\n{'the walk':<46}{'learnt':>10}  {'recorded':>20}"
+    for key, each in content["walk"].items():
+        measure = measure_of(key)
+        low, mean, high = each["recorded"] or (None, None, None)
+        beside = "" if mean is None else f"{mean:.3g} ({low:.3g} to {high:.3g})"
+        yield f"{f'{measure.label} [{measure.unit}]':<46}{each['learnt']:>10.3g}  {beside:>20}"
     yield f"\n{'learnt number':<46}{'value':>10}  {'one deviation':>20}{'prior':>10}  told by"
-    for place, number in result.learnt.numbers.items():
-        low, high = result.interval(place)
-        told = "recordings" if result.told[place] > TOLD else "prior alone"
-        name = f"{place} [{unit}]" if (unit := result.unit(place)) else place
-        yield (f"{name:<46}{number.learnt:>10.4g}  {f'{low:.4g} to {high:.4g}':>20}"
-               f"{number.prior:>10.4g}  {told} ({100.0 * result.told[place]:.0f} %)")  # fmt: skip
-    silent = [place for place, told in result.told.items() if told <= TOLD]
-    if silent:
+    for place, each in content["numbers"].items():
+        span = "{:.4g} to {:.4g}".format(*each["interval"])
+        told = "recordings" if each["told"] > TOLD else "prior alone"
+        name = f"{place} [{each['unit']}]" if each["unit"] else place
+        yield (f"{name:<46}{each['learnt']:>10.4g}  {span:>20}"
+               f"{each['prior']:>10.4g}  {told} ({100.0 * each['told']:.0f} %)")  # fmt: skip
+    told_of = [each["told"] for each in content["numbers"].values()]
+    if silent := sum(told <= TOLD for told in told_of):
         yield (
-            f"\nthe recordings do not determine {len(silent)} of {len(result.told)} numbers, which "
+            f"\nthe recordings do not determine {silent} of {len(told_of)} numbers, which "
             "stay where their priors put them or follow from others: compare no child by them"
         )
-    acting = ", ".join(result.active) or "none"
-    yield f"\nranges that hold the result: {acting}"
+    yield f"\nranges that hold the result: {', '.join(result.active) or 'none'}"
     starts = ", ".join(f"{misfit:.2f}" for misfit in result.misfits)
     yield (
         f"misfit by start: {starts} (of the best, distance from the priors "
@@ -260,30 +245,18 @@ def learn_lines(result: LearnResult) -> Iterator[str]:
            f"{result.cpu_seconds:.0f} CPU s after the first")  # fmt: skip
 
 
-def _fit_lines(result: LearnResult) -> Iterator[str]:
-    rms, own = rms_mean_cycle(result.stride, result.recorded), recorded_rms_mean_cycle(
-        result.recorded
-    )  # fmt: skip
-    rows: Mapping[str, Mapping[str, float]] = {
-        "learnt": rms,
-        "own cycles": {joint: spread.mean for joint, spread in own.items()},
-    }
+def _fit_lines(content: Mapping[str, Any]) -> Iterator[str]:
+    rms, left = content["rms_mean_cycle"], content["left_out"]
     yield f"{'RMS to the mean cycle [deg]':<30}" + "".join(f"{j:>9}" for j in (*rms, "mean"))
-    for name, values in rows.items():
+    for name, values in (("learnt", rms), ("own cycles", content["rms_own_cycles"])):
         each = [float(to_degrees(values[joint])) for joint in rms if joint in values]
         if len(each) == len(rms):
             yield f"{name:<30}" + "".join(f"{x:>9.1f}" for x in (*each, float(np.mean(each))))
-    if (left := result.left_out) is not None:
-        yield (f"trials left out one by one, to first order: {float(to_degrees(left.learnt)):.1f} "
-               f"deg (the other trials' mean: {float(to_degrees(left.own)):.1f})")  # fmt: skip
-    for key, value in force_rms(result.stride, result.recorded).items():
+    if left is not None:
+        learnt, others = (float(to_degrees(left[key])) for key in ("learnt", "own"))
+        yield (
+            f"trials left out one by one, to first order: {learnt:.1f} deg (the other trials' "
+            f"mean: {others:.1f})"
+        )
+    for key, value in content["force_rms"].items():
         yield f"{key.replace('_', ' '):<30}{value:>9.1f} N"
-
-
-def _walk_lines(result: LearnResult) -> Iterator[str]:
-    recorded = recorded_numbers(result.recorded)
-    yield f"\n{'the walk':<46}{'learnt':>10}  {'recorded':>20}"
-    for key, value in _walk(result.stride).items():
-        measure, r = measure_of(key), recorded.get(key)
-        beside = "" if r is None else f"{r.mean:.3g} ({r.low:.3g} to {r.high:.3g})"
-        yield f"{f'{measure.label} [{measure.unit}]':<46}{value:>10.3g}  {beside:>20}"

@@ -7,7 +7,7 @@ References:
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -121,13 +121,27 @@ def perturb(study: PerturbationStudy, run: Run, work: Work) -> Perturbation:
     base = require_optimum(resolver, run, study.tolerance)
     before, ranges = measures(base), ranges_of(base)
     further = free_units(base.solver.walker.unknowns)
-    points = list(_points(study, case, moved_numbers(study, base.solver), before))
+    moved = moved_numbers(study, base.solver)
+    cases = {  # all are there before any is solved
+        (unknown, factor): _moved(case, unknown, factor, before)
+        for unknown in moved
+        for factor in study.factors
+    }
+    journal = Journal(work.folder / POINTS, run, resolver)
     rows = {}
-    for point, optimum in _solved(points, Journal(work.folder / POINTS, run, resolver), base):
-        row = _perturbed(point, optimum, before, ranges, study.tolerance)
-        rows[row.name, row.factor] = row
-        work.report(f"{row.moved}: {row.status}, {row.iterations} iterations, {row.seconds:.1f} s")
-    order = [(unknown.name, f) for unknown, _ in points for f in study.factors]
+    for unknown in moved:
+        nearest = {True: base, False: base}
+        # those further away start from nearer ones on the same side
+        for factor in sorted(study.factors, key=lambda factor: abs(np.log(factor))):
+            value, at = cases[unknown, factor]
+            end = journal.resolve(f"{unknown.name}-x{factor:g}", at, nearest[factor < 1.0])
+            if end.converged:
+                nearest[factor < 1.0] = end
+            row = _perturbed(unknown, factor, value, end, before, ranges, study.tolerance)
+            work.report(
+                f"{row.moved}: {row.status}, {row.iterations} iterations, {row.seconds:.1f} s"
+            )
+            rows[unknown, factor] = row
     return Perturbation(
         problem=case.config.problem,
         patient=base.solver.walker.patient.id,
@@ -136,67 +150,47 @@ def perturb(study: PerturbationStudy, run: Run, work: Work) -> Perturbation:
         optimum=before,
         ranges=ranges,
         measures=tuple(m for m in measures_with(further) if m.key in before),
-        rows=tuple(rows[key] for key in order),
+        rows=tuple(rows[key] for key in cases),
         seconds=time.perf_counter() - began,
     )
 
 
-_Point = tuple[Unknown, float, float, Case]
-"""What is moved, factor, value [its unit] and case of a neighbour."""
-
-
-def _points(
-    study: PerturbationStudy, case: Case, moved: tuple[Unknown, ...], before: Mapping[str, float]
-) -> Iterator[tuple[Unknown, list[_Point]]]:
-    """Yield the neighbours by number, nearest ones first."""
-    for unknown in moved:
-        points = []
-        for factor in sorted(study.factors, key=lambda factor: abs(np.log(factor))):
-            # rounded, so that a restart on another machine asks for the very same number
-            value = round(factor * before[unknown.name], 6)
-            values = held(case.config, {unknown: value})
-            case_at = case.with_values(values, f"{unknown.name} x {factor:g}")
-            points.append((unknown, factor, value, case_at))
-        yield unknown, points
-
-
-def _solved(
-    plan: list[tuple[Unknown, list[_Point]]], journal: Journal, base: Optimum
-) -> Iterator[tuple[_Point, Optimum]]:
-    """Yield all neighbours; those further away start from nearer ones on the same side."""
-    for unknown, points in plan:
-        nearest = {True: base, False: base}
-        for point in points:
-            _, factor, _, case = point
-            name = f"{unknown.name}-x{factor:g}"
-            optimum = journal.resolve(name, case, nearest[factor < 1.0])
-            if optimum.converged:
-                nearest[factor < 1.0] = optimum
-            yield point, optimum
+def _moved(
+    case: Case, unknown: Unknown, factor: float, before: Mapping[str, float]
+) -> tuple[float, Case]:
+    """Return what a number is moved to [its unit], and the case in which it is."""
+    # rounded, so that a restart on another machine asks for the very same number
+    value = round(factor * before[unknown.name], 6)
+    values = held(case.config, {unknown: value})
+    return value, case.with_values(values, f"{unknown.name} x {factor:g}")
 
 
 def _perturbed(
-    point: _Point, optimum: Optimum, before: Mapping[str, float], ranges: Ranges, tolerance: float
+    unknown: Unknown,
+    factor: float,
+    value: float,
+    optimum: Optimum,
+    before: Mapping[str, float],
+    ranges: Ranges,
+    tolerance: float,
 ) -> Perturbed:
-    """Return one neighbour in numbers."""
-    unknown, factor, moved, case = point
     values = measures(optimum) if optimum.converged else {}
-    changes = {k: value / before[k] - 1.0 for k, value in values.items() if before[k]}
+    changes = {k: after / before[k] - 1.0 for k, after in values.items() if before[k]}
     change = changes.get("cost", 0.0)
     falls = change < -_NOISE * tolerance
     end = spring_ends(before, ranges).get(unknown.name, "")
     limits = ranges[unknown.name]
-    note, explained = remark(end, moved, limits, change if falls else 0.0, unknown.unit)
+    note, explained = remark(end, value, limits, change if falls else 0.0, unknown.unit)
     return Perturbed(
         name=unknown.name,
         label=unknown.label,
         unit=unknown.unit,
         factor=factor,
-        value=moved,
+        value=value,
         status=optimum.result.status,
         values=values,
         changes=changes,
-        changes_article=paper_changes(case, unknown.name, factor),
+        changes_article=paper_changes(optimum.case, unknown.name, factor),
         cost_falls=falls,
         no_true_optimum=falls and not explained,
         note=note if values else f"not converged: {optimum.result.status}",

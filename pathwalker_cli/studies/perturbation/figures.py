@@ -72,7 +72,6 @@ def _draw(ax: Axes, result: Perturbation, key: str) -> None:
 
 
 def _handles(result: Perturbation) -> list[Artist]:
-    """Return the entries of the legend."""
     handles = [
         style.entry(f"{side} {result.noun} moved", color=style.LINE_COLOUR[side],
                     marker=style.MARKER[side], markersize=4.5)

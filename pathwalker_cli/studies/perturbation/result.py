@@ -89,18 +89,9 @@ _ABOUT: Final = frozenset({"name", "label", "unit", "factor", "value"})
 
 @dataclass(frozen=True)
 class Perturbation:
-    """All numbers moved.
+    """All numbers moved; SI units.
 
-    Args:
-        problem: The problem.
-        patient: Id of the patient.
-        tolerance: Optimality tolerance of all solves.
-        intervals: Mesh intervals of all solves.
-        optimum: Measures and unknowns of the optimum, SI units.
-        ranges: Allowed range by name [SI].
-        measures: What there are values of, in order.
-        rows: One per number and factor.
-        seconds: Wall seconds in all, the solve of the optimum from nothing apart.
+    `seconds` leaves out the solve of the optimum from nothing.
     """
 
     problem: str

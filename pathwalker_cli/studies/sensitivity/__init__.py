@@ -155,7 +155,6 @@ def sensitivities(asked: SensitivityStudy, run: Run, work: Work) -> Sensitivitie
 
 
 def _sensitivity(around: Neighbourhood, place: str, base: Mapping[str, float]) -> Sensitivity:
-    """Return the answer to one number."""
     value, unknown = _value(around.optimum, place), _unknown(around.optimum, place)
     if unknown is not None:
         derivative, unit = around.by_unknown(unknown), around.optimum.value(unknown)

@@ -42,15 +42,9 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class Check:
-    """One answer beside a finite difference of two solves.
+    """One answer beside the central difference of two solves, a relative step up and down.
 
-    Args:
-        place: What was changed.
-        step: Relative change up and down.
-        derivatives: Central differences of the measures by the relative change.
-        iterations: Iterations of both solves together.
-        seconds: Seconds of both solves.
-        changed: Inequalities that are active in one of the solves and not in the optimum.
+    `changed` counts inequalities that are active in one of the solves and not in the optimum.
     """
 
     place: str
@@ -63,18 +57,10 @@ class Check:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """All answers.
+    """All answers around an optimum, whose measures are `base`; SI units.
 
-    Args:
-        problem: The problem.
-        patient: Id of the patient.
-        tolerance: Optimality tolerance of the optimum.
-        base: Measures of the optimum; SI units.
-        rows: The answers.
-        checks: Those that were checked.
-        active: Number of active inequalities at the optimum.
-        doubtful: Number of those that are neither clearly active nor clearly inactive.
-        seconds: Wall seconds of the answers, without solving the optimum and without checks.
+    `active` counts its active inequalities, `doubtful` those of which that is not clear; `seconds`
+    leaves out the solve of the optimum and checks.
     """
 
     problem: str

@@ -83,15 +83,15 @@ def tradeoff_of(study: TradeoffStudy, run: Run, work: Work) -> Tradeoff:
     )
     weights = study.walking_speed_weights
     explored = explore(chain(weights, base), near.optimum, solve, rules)
-    refined = _Refined(work)
-    points = []
+    points, seconds_refined = [], 0.0
     for weight in weights:
         branches = explored.branches[f"w{weight:g}"]
         point = _point(weight, branches)
         if study.refine and point.mesh == "inaccurate":
-            point = refined.point(point, branches[0].end)
+            point, seconds = _refined(point, branches[0].end, work)
+            seconds_refined += seconds
         points.append(point)
-    return _result(near, explored, judged(points), refined.seconds)
+    return _result(near, explored, judged(points), seconds_refined)
 
 
 def without_reward(optimum: Optimum) -> float:
@@ -123,39 +123,36 @@ def _point(weight: float, branches: Sequence[Branch[Optimum]]) -> FrontPoint:
     )
 
 
-class _Refined:
-    """Solves points on meshes of their own, each into a run folder; those that are there stay."""
+def _refined(point: FrontPoint, optimum: Optimum, work: Work) -> tuple[FrontPoint, float]:
+    """Return a point with the numbers of a refined mesh, if that converges, and its seconds.
 
-    def __init__(self, work: Work) -> None:
-        self._work = work
-        self.seconds = 0.0
-
-    def point(self, point: FrontPoint, optimum: Optimum) -> FrontPoint:
-        """Return a point with the numbers of a refined mesh, if that converges."""
-        weight, case, log = point.walking_speed_weight, optimum.case, self._work.log
-        folder = self._work.folder / "runs" / f"w{weight:g}"
-        if done_run(folder, case) is None:
-            write_run(folder, GaitSolver(case, log).solve(optimum.motion), log.lines)
-        run = load_run(folder, allow_unconverged=True)
-        metrics = run.metrics
-        self.seconds += metrics["seconds_solve"]
-        errors = metrics["reintegration_position_error"], metrics["reintegration_velocity_error"]
-        self._work.report(
-            f"      w{weight:<23g} {metrics['status']} on {metrics['intervals']} "
-            f"intervals, errors {errors[0]:.1e}, {errors[1]:.1e}"
-        )
-        if metrics["status"] != "converged":
-            return replace(point, status=f"on a finer mesh: {metrics['status']}")
-        numbers = {
-            m.key: metrics[m.key] for m in measures_in("studies") if metrics.get(m.key) is not None
-        }
-        unknowns = optimum.solver.walker.unknowns
-        for name in free_units(unknowns):
-            which = [unknown.name for unknown in unknowns].index(name)
-            numbers[name] = float(run.motion.parameters[which])
-        return replace(
-            point, mesh="refined", measures=numbers, errors=errors, intervals=metrics["intervals"]
-        )
+    It is solved into a run folder; what is there already stays.
+    """
+    weight, case = point.walking_speed_weight, optimum.case
+    folder = work.folder / "runs" / f"w{weight:g}"
+    if done_run(folder, case) is None:
+        write_run(folder, GaitSolver(case, work.log).solve(optimum.motion), work.log.lines)
+    run = load_run(folder, allow_unconverged=True)
+    metrics = run.metrics
+    seconds = metrics["seconds_solve"]
+    errors = metrics["reintegration_position_error"], metrics["reintegration_velocity_error"]
+    work.report(
+        f"      w{weight:<23g} {metrics['status']} on {metrics['intervals']} "
+        f"intervals, errors {errors[0]:.1e}, {errors[1]:.1e}"
+    )
+    if metrics["status"] != "converged":
+        return replace(point, status=f"on a finer mesh: {metrics['status']}"), seconds
+    numbers = {
+        m.key: metrics[m.key] for m in measures_in("studies") if metrics.get(m.key) is not None
+    }
+    unknowns = optimum.solver.walker.unknowns
+    for name in free_units(unknowns):
+        which = [unknown.name for unknown in unknowns].index(name)
+        numbers[name] = float(run.motion.parameters[which])
+    better = replace(
+        point, mesh="refined", measures=numbers, errors=errors, intervals=metrics["intervals"]
+    )
+    return better, seconds
 
 
 def _result(
@@ -164,7 +161,6 @@ def _result(
     points: tuple[FrontPoint, ...],
     seconds_refined: float,
 ) -> Tradeoff:
-    """Return everything as plain numbers."""
     config, solver = near.run.config, near.optimum.solver
     recorded = solver.walker.patient.recorded.get(config.condition)
     ends = [attempt.end.result for attempt in explored.attempts]

@@ -77,7 +77,6 @@ def labels(points: Sequence[FrontPoint]) -> list[tuple[FrontPoint, str]]:
 
 
 def _draw_springs(ax: Axes, tradeoff: Tradeoff) -> None:
-    """Draw the four stiffnesses over speed."""
     front = tradeoff.front_points
     for name in tradeoff.springs:
         stiffness = [point.measures[name] for point in front]
@@ -108,7 +107,6 @@ _COARSE: Final[dict[str, Any]] = {
 
 
 def _handles(tradeoff: Tradeoff) -> list[Artist]:
-    """Return the legend entries of what is in the figure."""
     handles = [style.entry("front, with weight of speed", **_FRONT)]
     if len(tradeoff.front) < len(tradeoff.solved):
         handles.append(style.entry("dominated", **_BEATEN))

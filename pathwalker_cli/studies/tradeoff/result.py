@@ -88,25 +88,14 @@ class FrontPoint:
 
 @dataclass(frozen=True)
 class Tradeoff:
-    """Effort against walking speed, as `tradeoff.json` has it.
+    """Effort against walking speed, as `tradeoff.json` has it; points by rising weight of speed.
 
     Args:
-        problem: The problem.
-        patient: Id of the patient.
-        condition: Condition that it is about.
-        points: The points, by rising weight.
-        base_weight: Weight of the run that the study began with.
-        optimum: Measures of that run, SI units.
+        base_weight: Weight of the run that the study began with, with the measures `optimum` [SI].
         front: Weights of the points that no other one beats, by rising speed.
         recorded_walking_speed: Least and largest one in that condition [m/s]; None without any.
         tolerances: Largest re-integration errors allowed [rad or m], [rad/s or m/s].
-        solves: Solves on the mesh of the base.
-        failed_solves: Those that did not converge.
-        median_iterations: Median of the iterations of each.
-        seconds: Wall seconds of all of them.
-        seconds_refined: Wall seconds of the solves on refined meshes.
-        sweeps: Sweeps over the weights.
-        sweeps_found_nothing_new: Whether the last sweep found nothing new.
+        seconds: Wall seconds of all solves on the mesh of the base.
         further: SI units of the unknowns beside the springs, by name.
     """
 
@@ -205,7 +194,6 @@ def tradeoff_lines(tradeoff: Tradeoff) -> list[str]:
 
 
 def _line(tradeoff: Tradeoff, point: FrontPoint) -> str:
-    """Return one row of the table."""
     weight = f"{point.walking_speed_weight:9.3g}"
     if not point.solved or point.mesh is None:
         return f"{weight}  {point.status}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final
@@ -128,9 +127,15 @@ def uncertainty(study: UncertaintyStudy, run: Run, work: Work) -> Uncertainty:
     draws, drawn = study.drawn(case)
     cases = {f"draw-{i:05d}": each for i, each in enumerate(drawn)}
     base = require_optimum(resolver_of(run, study.tolerance), run, study.tolerance)
-    counted = _counted(study.draws, work.report)
+
+    def tell(done: int, solved: Solved) -> None:
+        if solved.status != "converged":
+            work.report(f"{solved.name}: {solved.status}")
+        if done % _EVERY == 0 or done == study.draws:
+            work.report(f"{done} of {study.draws} draws")
+
     folder = work.folder / DRAWS
-    solved = solve_all(cases, run, folder, study.tolerance, work.workers, counted)
+    solved = solve_all(cases, run, folder, study.tolerance, work.workers, tell)
     numbers, further = measures(base), free_units(base.solver.walker.unknowns)
     return Uncertainty(
         config=case.config,
@@ -145,21 +150,6 @@ def uncertainty(study: UncertaintyStudy, run: Run, work: Work) -> Uncertainty:
         seconds=time.perf_counter() - began,
         workers=min(work.workers, len(cases)),
     )
-
-
-def _counted(total: int, report: Callable[[str], None]) -> Callable[[Solved], None]:
-    """Return what reports how many draws are done, and names failed ones at once."""
-    done = 0
-
-    def count(solved: Solved) -> None:
-        nonlocal done
-        done += 1
-        if solved.status != "converged":
-            report(f"{solved.name}: {solved.status}")
-        if done % _EVERY == 0 or done == total:
-            report(f"{done} of {total} draws")
-
-    return count
 
 
 def _write(result: Uncertainty, folder: Path) -> None:

@@ -76,12 +76,7 @@ class Distribution(YamlModel):
 
 @dataclass(frozen=True)
 class Input:
-    """One number, or one block of numbers that change together, that is drawn.
-
-    Args:
-        place: Its place in the patient's file, or of a learnt number also in the config.
-        distribution: Its distribution; None of a learnt number, whose values are drawn.
-    """
+    """A number, or a block of numbers that change together; learnt where not distributed."""
 
     place: str
     distribution: Distribution | None = None
@@ -101,12 +96,7 @@ class Input:
 
 @dataclass(frozen=True)
 class Draws:
-    """What was drawn.
-
-    Args:
-        inputs: What is drawn.
-        values: Factors and shifts, of learnt numbers values, shape (draws, inputs).
-    """
+    """What was drawn: factors and shifts, of learnt numbers values, shape (draws, inputs)."""
 
     inputs: tuple[Input, ...]
     values: np.ndarray

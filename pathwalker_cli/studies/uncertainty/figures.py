@@ -18,7 +18,7 @@ from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.save import save_formats
 from pathwalker_cli.studies.measures import Ranges
-from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level, spreads
+from pathwalker_cli.studies.uncertainty.result import Spread, Uncertainty, chance_level
 
 _STRIP: Final = 0.22
 """Half the height over which points of a row are scattered, so that equal ones can be told."""
@@ -36,10 +36,9 @@ def save_uncertainty_figures(result: Uncertainty, folder: Path) -> None:
     """Save all figures as PNG and SVG; none without draws that converged."""
     if not result.converged:
         return
-    all_spreads = spreads(result)
     values = {measure.key: result.values(measure.key) for measure in result.measures}
-    save_formats(spread_figure(values, result.ranges, all_spreads), folder, "uncertainty")
-    save_formats(correlation_figure(result, all_spreads), folder, "correlations")
+    save_formats(spread_figure(values, result.ranges, result.spreads), folder, "uncertainty")
+    save_formats(correlation_figure(result), folder, "correlations")
 
 
 def spread_figure(
@@ -100,7 +99,6 @@ def _stiffness_axis(ax: Axes) -> None:
 
 
 def _limits(spread: Spread) -> str:
-    """Return how often a spring sits at a limit."""
     if spread.lower is None or spread.upper is None:
         return "prescribed"
     return f"softest {100.0 * spread.lower:.0f} %, stiffest {100.0 * spread.upper:.0f} %"
@@ -112,7 +110,6 @@ def _rows(ax: Axes, labels: list[str], top: float) -> None:
 
 
 def _handles(count: int) -> list[Artist]:
-    """Return the entries of the legend."""
     sides = [
         style.entry(s, color=style.LINE_COLOUR[s], marker=style.MARKER[s], linewidth=0,
                     markersize=4.5)
@@ -127,10 +124,10 @@ def _handles(count: int) -> list[Artist]:
     ]
 
 
-def correlation_figure(result: Uncertainty, all_spreads: list[Spread]) -> Figure:
+def correlation_figure(result: Uncertainty) -> Figure:
     """Return the rank correlation of every input with every measure as a coloured table."""
     inputs = [entry.place for entry in result.draws.inputs]
-    table = np.array([spread.correlations for spread in all_spreads]).T
+    table = np.array([spread.correlations for spread in result.spreads]).T
     level = chance_level(len(result.converged), len(inputs))
     with mpl.rc_context(style.STYLE):
         fig = style.new_figure(1.5 + 0.13 * len(inputs))
@@ -144,7 +141,8 @@ def correlation_figure(result: Uncertainty, all_spreads: list[Spread]) -> Figure
             elif not np.isfinite(value):
                 ax.text(x, y, "-", color=style.NEUTRAL, **_CELL)
         ax.set_yticks(range(len(inputs)), [_input(place) for place in inputs])
-        ax.set_xticks(range(len(all_spreads)), [s.measure.short for s in all_spreads], rotation=90)
+        names = [measure.short for measure in result.measures]
+        ax.set_xticks(range(len(names)), names, rotation=90)
         ax.tick_params(length=0.0)
         words = (
             f"rank correlation [1]; numbers where chance\n(up to {level:.2f}) does not explain it"

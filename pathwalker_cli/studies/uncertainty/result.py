@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
@@ -54,17 +55,10 @@ class Uncertainty:
     """All draws and where they ended.
 
     Args:
-        config: The config of the base.
-        patient: Id of the patient.
-        intervals: Mesh intervals of all solves.
         base: Measures at the numbers of the file, SI units.
         ranges: Allowed range by spring and further number [SI].
-        measures: What is measured, in order.
         further: SI units of the unknowns beside the springs, by name.
-        draws: What was drawn.
-        solved: How each draw ended, in order.
         seconds: Wall seconds in all, the solve of the base from nothing apart.
-        workers: Processes that solved.
     """
 
     config: StudyConfig
@@ -88,6 +82,11 @@ class Uncertainty:
     def converged(self) -> tuple[Solved, ...]:
         """Draws that did."""
         return tuple(end for end in self.solved if end.values)
+
+    @cached_property
+    def spreads(self) -> tuple[Spread, ...]:
+        """How every measure spreads over the converged draws."""
+        return tuple(_spread(self, measure) for measure in self.measures)
 
     def values(self, key: str) -> np.ndarray:
         """Return a measure of all converged draws; at a limit, the limit itself, shape (n,)."""
@@ -132,11 +131,6 @@ class Spread:
         if self.strongest is None:
             return None
         return float(self.correlations[np.nanargmax(np.abs(self.correlations))])
-
-
-def spreads(result: Uncertainty) -> list[Spread]:
-    """Return how every measure spreads."""
-    return [_spread(result, measure) for measure in result.measures]
 
 
 def _spread(result: Uncertainty, measure: Measure) -> Spread:
@@ -206,18 +200,17 @@ def _strongest(inputs: Sequence[Input], correlations: Iterable[float], draws: in
 def write_tables(result: Uncertainty, folder: Path) -> None:
     """Write `draws.csv`, `uncertainty.csv`, `correlations.csv` and `uncertainty.json`."""
     _write_draws(result, folder / FILES[0])
-    all_spreads = spreads(result)
     header = ["measure", "unit", "base", "quantile 0.05", "median", "quantile 0.95", "draws [1]",
               "share at lower limit [1]", "share at upper limit [1]", "strongest input",
               "rank correlation [1]"]  # fmt: skip
     rows = []
-    for spread in all_spreads:
+    for spread in result.spreads:
         numbers = [_number(value) for value in (spread.base, *spread.quantiles)]
         rows.append([spread.measure.key, spread.measure.unit, *numbers, len(result.converged),
                      spread.lower, spread.upper, spread.place, spread.strength])  # fmt: skip
     write_table(folder / FILES[1], header, rows)
     columns: list[list[Any]] = [["input", *(entry.place for entry in result.draws.inputs)]]
-    columns += [[f"{s.measure.key} [1]", *map(_number, s.correlations)] for s in all_spreads]
+    columns += [[f"{s.measure.key} [1]", *map(_number, s.correlations)] for s in result.spreads]
     names, *lines = zip(*columns, strict=True)
     write_table(folder / FILES[2], names, lines)
     write_json(folder / FILES[3], uncertainty_content(result))
@@ -236,18 +229,19 @@ def uncertainty_content(result: Uncertainty) -> dict[str, Any]:
         "base": result.base,
         **range_content(result.ranges),
         **({"further": result.further} if result.further else {}),
-        "spreads": {spread.measure.key: _spread_content(spread) for spread in spreads(result)},
-        "advice": list(_advice(result, spreads(result))) if result.converged else [],
-    }
-
-
-def _spread_content(spread: Spread) -> dict[str, Any]:
-    return {
-        "quantiles": dict(zip(map(str, QUANTILES), map(_number, spread.quantiles), strict=True)),
-        "share_at_lower_limit": spread.lower,
-        "share_at_upper_limit": spread.upper,
-        "strongest_input": spread.place or None,
-        "rank_correlation": spread.strength,
+        "spreads": {
+            spread.measure.key: {
+                "quantiles": dict(
+                    zip(map(str, QUANTILES), map(_number, spread.quantiles), strict=True)
+                ),
+                "share_at_lower_limit": spread.lower,
+                "share_at_upper_limit": spread.upper,
+                "strongest_input": spread.place or None,
+                "rank_correlation": spread.strength,
+            }
+            for spread in result.spreads
+        },
+        "advice": list(_advice(result)) if result.converged else [],
     }
 
 
@@ -280,11 +274,10 @@ def uncertainty_lines(result: Uncertainty) -> Iterator[str]:
     if converged:
         yield ""
         yield _line("", "base", "median", span_words(converged), "follows most", "rank corr.")
-        all_spreads = spreads(result)
-        yield from (_row(result, spread) for spread in all_spreads)
+        yield from (_row(result, spread) for spread in result.spreads)
         yield ""
-        yield from _limits(result, all_spreads)
-        yield from _advice(result, all_spreads)
+        yield from _limits(result)
+        yield from _advice(result)
         level = chance_level(converged, inputs)
         yield f"a correlation up to {level:.2f} may be chance among {inputs} inputs: none is named"
     yield ""
@@ -311,9 +304,9 @@ def _line(label: str, base: str, middle: str, span: str, place: str, strength: s
     return f"{label:<37}{base:>8}{middle:>9}{span:>18}  {place:<34}{strength:>10}".rstrip()
 
 
-def _limits(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
+def _limits(result: Uncertainty) -> Iterator[str]:
     """Yield how often each spring and further number sits at a limit."""
-    for spread in all_spreads:
+    for spread in result.spreads:
         key, unit = spread.measure.key, spread.measure.unit
         if spread.lower is None or spread.upper is None:
             if key in result.ranges:
@@ -329,7 +322,7 @@ def _limits(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
         yield "no spring is free"
 
 
-def _advice(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
+def _advice(result: Uncertainty) -> Iterator[str]:
     """Yield, of learnt numbers, which springs they leave open, and what to measure first.
 
     What walking costs cannot be measured; tissue, range of motion and strength can.
@@ -338,7 +331,7 @@ def _advice(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
             if entry.distribution is None and not entry.place.startswith(COST)]  # fmt: skip
     level = chance_level(len(result.converged), len(result.draws.inputs))
     most = "90 %" if len(result.converged) >= ENOUGH else "nearly all"
-    for spread in all_spreads:
+    for spread in result.spreads:
         low, high = result.ranges.get(spread.measure.key, (0.0, 0.0))
         if not rows or not low < high:
             continue
@@ -363,7 +356,6 @@ def _advice(result: Uncertainty, all_spreads: list[Spread]) -> Iterator[str]:
 
 
 def _failures(result: Uncertainty) -> Iterator[str]:
-    """Yield what happened to draws that did not converge."""
     if not result.failed:
         return
     share = 100.0 * len(result.failed) / len(result.solved)
@@ -391,7 +383,6 @@ def _extremes(result: Uncertainty, number: int) -> str:
 
 
 def _seconds(result: Uncertainty) -> str:
-    """Return how long it took."""
     fresh = [end for end in result.solved if not end.kept]
     kept = len(result.solved) - len(fresh)
     there = f", {kept} were there already" if kept else ""
