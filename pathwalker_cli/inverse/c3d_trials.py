@@ -122,8 +122,8 @@ def _with_events(walk: Recording, model: pin.Model, motion: Trajectory) -> Recor
     found = events_of_motion(motion["pelvis_tx"], foot_extents(model, motion.values), walk.rate)
     loads = [np.abs(load.force[:, 2]) for load in plate_loads(walk)]
     events, moved = set_by_plates(found, loads, LOADED, walk.rate)
-    by_plates = f", {moved} of them from the plates" if moved else ""
-    remark = f"names no foot strikes: found {len(events)} events from the markers{by_plates}"
+    by_plates = f", {moved} of them at the edges of a plate's load" if moved else ""
+    remark = f"names no foot strikes: {len(events)} events found by the markers{by_plates}"
     return replace(walk, events=events, remarks=(*walk.remarks, remark))
 
 

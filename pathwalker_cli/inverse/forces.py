@@ -40,6 +40,8 @@ _TOES: Final = 0.39
 """How far toes reach beyond the toe marker on the second metatarsal head, as a share of heel to toe
 marker: the head lies at 72 % of the foot's length."""
 
+_HOW_TO_MEND: Final = "; import --mend-plates, or mend_plates: true in a config, mends it"
+
 _HEADINGS: Final = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
 
 
@@ -111,10 +113,8 @@ def ground_forces(
     weight = GRAVITY * pin.computeTotalMass(model)
     prints = _footprints(model, feet, aside)
     faults = plate_faults(loads, stances(recording.events), prints, weight)
-    remarks = tuple(
-        f"{loads[fault.plate].name} is {'mended' if mend else 'not used'}: {fault.what}"
-        for fault in faults
-    )
+    done, how = ("mended", "") if mend else ("not used", _HOW_TO_MEND)
+    remarks = tuple(f"{loads[f.plate].name} is {done}: {f.what}{how}" for f in faults)
     for fault in faults if mend else ():
         loads[fault.plate] = fault.mended
     points = np.stack([centre_of_pressure(load, LOADED)[:, 0] for load in loads], axis=1)

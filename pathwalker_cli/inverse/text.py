@@ -129,9 +129,9 @@ def _table(
     """Return an empty table with columns of names, and of numbers at the right."""
     table = Table(title=title, title_justify="left")
     for head in names:
-        table.add_column(head, no_wrap=True)
-    for head in numbers:
-        table.add_column(head, justify="right", no_wrap=no_wrap)
+        table.add_column(Text(head), no_wrap=True)
+    for head in numbers:  # as text: Table would take [mm] for a style
+        table.add_column(Text(head), justify="right", no_wrap=no_wrap)
     return table
 
 

@@ -94,7 +94,7 @@ def require_plates(recording: Recording) -> None:
         raise DataError(
             "has no force plates that can be read",
             where=recording.name,
-            allowed="plates of types 1 to 5 and 7 with their channels",
+            allowed="plates of types 1 to 7 with their channels",
             mend="use ik for joint angles alone, or export the analog channels too",
         )
 
