@@ -152,7 +152,7 @@ def test_force_of_a_clean_stance() -> None:
     ("made", "reason"),
     [
         ({"share": 0.2}, "no plate below the foot"),
-        ({"share": 0.7}, "carries 70% of the body"),
+        ({"share": 0.7}, "carries 70 % of the body"),
         ({"shift": 0.3}, "load not under the foot"),
         ({"late": 15}, "loaded before or after"),
     ],
@@ -263,7 +263,7 @@ def test_recorded_stances(trial: str, direction: str, measured: str) -> None:
     patient = load_patient("sreenivasa2017-patient")
     condition = "orthosis" if trial.startswith("orthosis") else "barefoot"
     config = RecordedConfig(patient=patient.id)
-    ((walk, read),) = c3d_trials(RECORDINGS / f"{trial}.c3d", patient, condition, config)
+    ((walk, read),) = c3d_trials([RECORDINGS / f"{trial}.c3d"], patient, condition, config)
     forces = ground_forces(read, pinocchio_model(patient, condition), walk.motion)
     assert forces.direction == direction
     assert forces.stances == walk.stances

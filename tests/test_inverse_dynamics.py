@@ -256,7 +256,8 @@ def test_own_residuals_and_strengths() -> None:
     names = ("3053176", "3053178", "3053179", "3053183", "3053184")
     paths = [SHARED / "recordings" / "barefoot" / f"{name}.c3d" for name in names]
     trials = [
-        with_torques(c3d_trials(path, patient, "barefoot", config)[0][0], patient) for path in paths
+        with_torques(c3d_trials([path], patient, "barefoot", config)[0][0], patient)
+        for path in paths
     ]
     found = [residuals(t.name, t.tau.values) for t in trials if t.tau is not None]
     table = residual_range(found)

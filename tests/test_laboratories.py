@@ -22,7 +22,9 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.body import measured_body
 from pathwalker_cli.inverse.c3d_trials import c3d_trials
 from pathwalker_cli.inverse.joint_centres import beside_joint, hip_centre
+from pathwalker_cli.inverse.kinematics import marker_paths
 from pathwalker_cli.inverse.marker_sets import leg_length, recognised
+from pathwalker_cli.inverse.markers import load_marker_set, marker_points
 from pathwalker_cli.inverse.study import Paths, RecordedConfig
 from pathwalker_cli.inverse.text import stance_notes, warnings
 from pathwalker_cli.inverse.trial import Trial
@@ -31,6 +33,7 @@ from pathwalker_cli.inverse.walk import about_vertical, cut, turned
 from pathwalker_cli.io.c3d import Recording, read_c3d
 from pathwalker_cli.io.c3d_write import write_c3d
 from pathwalker_cli.io.recordings import read_recording
+from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.starter.example import made_recordings
 
@@ -56,7 +59,7 @@ def evaluated(
     """Return the trials of a file."""
     config = RecordedConfig(patient=SHIPPED, markers=markers, **keys)
     patient = patient or load_patient(SHIPPED)
-    return [trial for trial, _ in c3d_trials(path, patient, "barefoot", config)]
+    return [trial for trial, _ in c3d_trials([path], patient, "barefoot", config)]
 
 
 @cache
@@ -442,6 +445,51 @@ def test_a_foot_beside_the_plate_does_not_strike_it(good: Trial, tmp_path: Path)
     assert [s.reason for s in trial.stances if s.plate is not None] == [""]
 
 
+def on_tiptoe(recording: Recording, degrees: float) -> Recording:
+    """Return a walk whose feet are plantarflexed further in every frame."""
+    positions = recording.positions.copy()
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[cos, 0.0, -sin], [0.0, 1.0, 0.0], [sin, 0.0, cos]])
+    for side in "LR":
+        ankle, toe = recording.marker(f"{side}ANK"), recording.marker(f"{side}TOE")
+        positions[:, recording.markers.index(f"{side}TOE")] = ankle + (toe - ankle) @ turn
+    return replace(recording, positions=positions, plates=())
+
+
+def standing(recording: Recording) -> Recording:
+    """Return the made child upright on flat feet, the markers of a walk as far aside as there."""
+    patient = load_patient(SHIPPED)
+    points = marker_points(load_marker_set(), patient, "barefoot")
+    (pose,) = marker_paths(pinocchio_model(patient, "barefoot"), points, np.zeros((1, 10)))
+    positions = recording.positions[:1].repeat(60, 0)
+    at = dict(zip([point.marker for point in points], pose, strict=True))
+    at |= {"RASI": at["LASI"], "SACR2": at["SACR"]}
+    for column, name in enumerate(recording.markers):
+        positions[:, column, [0, 2]] = at.get(name, [0.0, 0.0]) + np.array([0.0, 0.6])
+    return replace(recording, positions=positions, plates=(), events=())
+
+
+def test_a_pose_tells_the_zero_of_feet_that_never_stand_flat(tmp_path: Path) -> None:
+    """Without heel markers the walk alone does not tell it."""
+    heels = ("LHEE", "RHEE")
+    flat = relabelled({name: f"no {name}" for name in heels})
+    flat = replace(flat, markers=tuple(n.replace("no SACR2", "SACR2") for n in flat.markers))
+    write_c3d(tmp_path / "flat.c3d", flat)
+    write_c3d(tmp_path / "tiptoe.c3d", on_tiptoe(flat, 25.0))
+    config = RecordedConfig(patient=SHIPPED, c3d=Paths(barefoot=(str(tmp_path),)))
+
+    def higher() -> np.ndarray:
+        trials = kinematics_trials(config, load_patient(SHIPPED), lambda _: None)
+        both = [trial.motion.select(("ankle_r", "ankle_l")).values for trial in trials]
+        return np.degrees(both[1] - both[0]).mean(axis=0)
+
+    assert (np.abs(higher() - 25.0) > 15.0).all()
+    write_c3d(tmp_path / "static.c3d", standing(flat))
+    assert higher() == pytest.approx([25.0, 25.0], abs=1.0)
+    trial, _ = kinematics_trials(config, load_patient(SHIPPED), lambda _: None)
+    assert "where its foot markers sit is measured in the pose" in said(trial)
+
+
 def with_numbers(file: Any) -> None:
     """Add what processing programs keep about the subject, lengths in mm."""
     file.add_parameter("PROCESSING", "Bodymass", [24.7])
@@ -501,7 +549,7 @@ def test_the_shipped_trials_stay_what_they_were(condition: Condition, measured: 
     patient, count = load_patient(SHIPPED), 0
     for path in sorted((RECORDINGS / condition).glob("*.c3d")):
         config = RecordedConfig(patient=SHIPPED)
-        ((trial, _),) = c3d_trials(path, patient, condition, config)
+        ((trial, _),) = c3d_trials([path], patient, condition, config)
         shipped = read_recording(patient, condition, path.stem)
         expected = shipped.motion.values[:, 1:]  # with six digits
         assert angles(trial) == pytest.approx(expected, rel=5.1e-6, abs=1e-6)

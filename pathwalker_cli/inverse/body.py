@@ -96,7 +96,7 @@ def measured_body(
             mend="use init without --from and measure lengths by tape",
         )
     check_markers(recording, [*known.markers.values()], height or _CHILD, path)
-    recording = _facing(recording, known)
+    recording = facing(recording, known)
     sources: list[str] = []
     mass = _told(recording, _MASS, mass, "body mass", sources)
     if mass is None:
@@ -113,7 +113,7 @@ def measured_body(
     return Body(mass, height, lengths, _soles(recording, known, height), tuple(sources))
 
 
-def _facing(recording: Recording, known: KnownSet) -> Recording:
+def facing(recording: Recording, known: KnownSet) -> Recording:
     """Return a recording with z up and x to where the pelvis faces."""
     front, back = known.middle("asis", recording), known.middle("psis", recording)
     if not np.isfinite(front - back).any():

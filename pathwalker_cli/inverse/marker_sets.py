@@ -86,6 +86,10 @@ _LEVEL: Final = 0.18
 on at one height."""
 
 
+FootPlaces = Mapping[tuple[Landmark, Side], tuple[float, float]]
+"""Toe and heel markers before and above the ankle of a foot that stands flat [m]."""
+
+
 @dataclass(frozen=True)
 class KnownSet:
     """A marker set that was recognised: marker by landmark and side.
@@ -169,6 +173,7 @@ def set_points(
     patient: Patient | None = None,
     recording: Recording | None = None,
     condition: Condition = "barefoot",
+    feet: FootPlaces | None = None,
 ) -> tuple[MarkerPoint, ...]:
     """Return where the markers of a known set sit on a patient's walker.
 
@@ -178,6 +183,8 @@ def set_points(
         recording: A pass in the walking plane, which tells the depth of the pelvis and where the
             foot markers are around the ankles; without it these are 0.
         condition: What is worn: a shoe that stands flat may hold the foot at a pitch.
+        feet: Where the foot markers are, as `foot_places` returns it, if the recording shall not
+            tell.
     """
     points: dict[tuple[str, str], MarkerPoint] = {}
 
@@ -191,7 +198,8 @@ def set_points(
                       for n in ("thigh", "shank"))  # fmt: skip
     height = patient.height if patient else 0.0
     depth = _pelvis_depth(known, recording) if recording else 0.0
-    feet = foot_places(known, recording) if recording else {}
+    if recording and not feet:
+        feet = foot_places(known, recording)
     for side in SIDES:
         add("asis", side, "pelvis", asis)
         add("psis", side, "pelvis", (asis[0] - depth, asis[1]))
@@ -200,7 +208,7 @@ def set_points(
         add("ankle", side, f"shank_{suffix}", (0.0, -shanks[side]))
         add("ankle", side, f"foot_{suffix}", (0.0, 0.0))
         for landmark in _FEET:
-            at = feet.get((landmark, side), (0.0, 0.0))
+            at = (feet or {}).get((landmark, side), (0.0, 0.0))
             if patient:
                 at = _pitched(at, patient.contacts(condition)[side])
             add(landmark, side, f"foot_{suffix}", at)
@@ -249,9 +257,7 @@ def _require_seen(frames: np.ndarray, what: str, recording: Recording) -> None:
         )
 
 
-def foot_places(
-    known: KnownSet, recording: Recording
-) -> dict[tuple[Landmark, Side], tuple[float, float]]:
+def foot_places(known: KnownSet, recording: Recording) -> FootPlaces:
     """Return toe and heel markers before and above the ankle of a foot that stands flat [m].
 
     Of a foot that never does, heel and toe marker are taken to be at one height; without a heel
