@@ -536,7 +536,10 @@ def test_plates_weigh_who_stands_on_them(tmp_path: Path) -> None:
     body = measured_body(tmp_path / "static.c3d")
     assert body.mass == pytest.approx(25.0, abs=0.1)
     assert body.height is not None
-    assert body.height == pytest.approx(1.25, abs=0.15), "from the neck, of a child in crouch"
+    assert body.height == pytest.approx(1.25, abs=0.15), "from the neck"
+    write_c3d(tmp_path / "pose.c3d", standing(relabelled({})))
+    upright = measured_body(tmp_path / "pose.c3d")
+    assert body.height == pytest.approx(upright.height, abs=0.04), "however far the knees bend"
 
 
 # --- files of real laboratories -------------------------------------------------------------------

@@ -165,9 +165,10 @@ def _measured_child(
             "no recording tells a child's age and sex", where="--from", mend="add --age and --sex"
         )
     body = measured_body(source, mass, height, subject)
-    for what, value in (("--mass", body.mass), ("--height", body.height)):
-        if value is None:
-            raise DataError("is not in the file", where=what, mend=f"add {what}")
+    told = {"--mass": body.mass, "--height": body.height}
+    if missing := " and ".join(option for option, value in told.items() if value is None):
+        what = f"does not tell {missing.replace('--', '')}"
+        raise DataError(what, where=str(source), mend=f"add {missing}")
     sources = ("age, sex: as given", *body.sources)
     return made_child(name, age, body.mass, body.height, sex=sex, lengths=body.lengths,
                       soles=body.soles, sources=sources)  # fmt: skip

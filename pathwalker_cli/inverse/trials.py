@@ -231,7 +231,12 @@ def _require_forces(trials: Sequence[Trial]) -> None:
         return
     first = trials[0].name
     if all(trial.tau is None for trial in trials):
-        raise DataError("no trial has ground forces", where=first, mend="import C3D files")
+        raise DataError(
+            "no trial has ground forces",
+            where=first,
+            allowed="recordings with force plates",
+            mend="import such, or use ik for joint angles alone",
+        )
     among = f" of {len(trials)} trials" if len(trials) > 1 else ""
     reasons = sorted({item.reason for item in stances if item.reason})
     raise DataError(
