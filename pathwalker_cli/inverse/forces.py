@@ -53,14 +53,12 @@ class GroundForces:
         table: Columns of `FORCE_COLUMNS` in every frame, NaN where not measured (centre of
             pressure: or without load).
         stances: What is known about every stance.
-        direction: Axis of the plates along which the patient walks, e.g. "-y".
         remarks: What was found wrong with the plates, a sentence each.
         loads: The plates with x along the walk and their loads in every frame, filtered.
     """
 
     table: Trajectory
     stances: tuple[StanceForce, ...]
-    direction: str = "+x"
     remarks: tuple[str, ...] = ()
     loads: tuple[ForcePlate, ...] = ()
 
@@ -102,7 +100,7 @@ def ground_forces(
     """
     if not recording.plates:
         raise DataError("has no force plates", where=recording.name)
-    feet, direction = foot_extents(model, motion.values), "+x"
+    feet = foot_extents(model, motion.values)
     if ahead is not None:
         feet = {side: ends + ahead[side][:, None] for side, ends in feet.items()}
     loads = plate_loads(recording)
@@ -130,7 +128,7 @@ def ground_forces(
     )
     judged = tuple(judge(stance, seen) for stance in stances(recording.events))
     table = _compose(recording, judged, [load.force[:, [0, 2]] for load in loads], points, ahead)
-    return GroundForces(table, judged, direction, remarks, tuple(loads))
+    return GroundForces(table, judged, remarks, tuple(loads))
 
 
 def plate_loads(recording: Recording, cutoff: float = FORCE_CUTOFF) -> list[ForcePlate]:

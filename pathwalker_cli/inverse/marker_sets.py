@@ -33,19 +33,15 @@ _NEEDED: Final[tuple[Landmark, ...]] = ("asis", "psis", "knee", "ankle", "toe")
 
 _FEET: Final[tuple[Landmark, ...]] = ("toe", "heel")
 
+_PLUG_IN_GAIT: Final[Mapping[Landmark, tuple[str, ...]]] = {
+    "asis": ("{}ASI",), "psis": ("{}PSI",), "knee": ("{}KNE",), "ankle": ("{}ANK",),
+    "toe": ("{}TOE",), "heel": ("{}HEE",), "c7": ("C7",), "clavicle": ("CLAV", "{}CLA"),
+}  # fmt: skip
+
 _LANDMARKS: Final[Mapping[str, Mapping[Landmark, tuple[str, ...]]]] = {
-    "Plug-in Gait": {
-        "asis": ("{}ASI",), "psis": ("{}PSI",), "knee": ("{}KNE",), "ankle": ("{}ANK",),
-        "toe": ("{}TOE",), "heel": ("{}HEE",), "c7": ("C7",), "clavicle": ("CLAV", "{}CLA"),
-    },
-    "Plug-in Gait with a sacral marker": {
-        "asis": ("{}ASI",), "psis": ("SACR",), "knee": ("{}KNE",), "ankle": ("{}ANK",),
-        "toe": ("{}TOE",), "heel": ("{}HEE",), "c7": ("C7",), "clavicle": ("CLAV", "{}CLA"),
-    },
-    "CGM2": {
-        "asis": ("{}ASI",), "psis": ("{}PSI",), "knee": ("{}KNE",), "ankle": ("{}ANK",),
-        "toe": ("{}SMH",), "heel": ("{}HEE",), "c7": ("C7",), "clavicle": ("CLAV", "{}CLA"),
-    },
+    "Plug-in Gait": _PLUG_IN_GAIT,
+    "Plug-in Gait with a sacral marker": {**_PLUG_IN_GAIT, "psis": ("SACR",)},
+    "CGM2": {**_PLUG_IN_GAIT, "toe": ("{}SMH",)},
     "Helen Hayes": {
         "asis": ("{}.ASIS", "{}ASIS"), "psis": ("V.Sacral", "Sacral", "SACRAL"),
         "knee": ("{}.Knee", "{}.Knee.Lat"), "ankle": ("{}.Ankle", "{}.Ankle.Lat"),
@@ -244,11 +240,7 @@ def _pelvis_depth(known: KnownSet, recording: Recording) -> float:
 
 
 def _require_seen(frames: np.ndarray, what: str, recording: Recording) -> None:
-    """Refuse a recording in which no frame shows what is measured.
-
-    Raises:
-        DataError: If so.
-    """
+    """Refuse a recording in which no frame shows what is measured."""
     if not frames.any():
         raise DataError(
             f"shows {what} in no frame at once",

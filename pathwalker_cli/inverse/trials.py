@@ -201,11 +201,7 @@ def recorded_stances(recording: CompactRecording) -> tuple[StanceForce, ...]:
 
 
 def require_trials(config: InverseDynamicsConfig, patient: Patient) -> None:
-    """Refuse a study without trials, or with names of trials that are not there.
-
-    Raises:
-        DataError: If so.
-    """
+    """Refuse a study without trials, or with names of trials that are not there."""
     there: list[str] = []
     for condition in config.conditions:
         if config.source == "c3d":

@@ -74,9 +74,6 @@ def check_markers(recording: Recording, names: Sequence[str], height: float, pat
     """Refuse a recording that lacks markers, or whose markers or plates cannot be right.
 
     The height is that of the patient [m].
-
-    Raises:
-        DataError: If so.
     """
     names = tuple(dict.fromkeys(names))
     _check_markers(recording, names, path)
@@ -85,11 +82,7 @@ def check_markers(recording: Recording, names: Sequence[str], height: float, pat
 
 
 def require_plates(recording: Recording) -> None:
-    """Refuse a recording without force plates.
-
-    Raises:
-        DataError: If there are none.
-    """
+    """Refuse a recording without force plates."""
     if not recording.plates:
         raise DataError(
             "has no force plates that can be read",

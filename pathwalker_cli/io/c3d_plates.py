@@ -197,11 +197,11 @@ def analog_channels(content: Any) -> np.ndarray:
     """Return the analog channels in physical units, shape (samples, channels)."""
     group = content["parameters"]["ANALOG"]
     channels = np.array(content["data"]["analogs"][0].T, dtype=float)
-    used = channels.shape[1]
     offset, scale = (
-        np.asarray(continued(group, name), dtype=float)[:used] for name in ("OFFSET", "SCALE")
+        np.asarray(continued(group, name), dtype=float)[: channels.shape[1]]
+        for name in ("OFFSET", "SCALE")
     )
-    general = float(group["GEN_SCALE"]["value"][0])
+    scale = scale * float(group["GEN_SCALE"]["value"][0])
     form = group["FORMAT"]["value"] if "FORMAT" in group else []
     unsigned = bool(form) and str(form[0]).strip().upper() == "UNSIGNED"
-    return channels - analog_offset_error(offset, scale * general, unsigned)
+    return channels - analog_offset_error(offset, scale, unsigned)
