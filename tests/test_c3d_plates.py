@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from pathwalker_cli.io.c3d import Recording, read_c3d
-from pathwalker_cli.io.c3d_plates import centre_of_pressure
+from pathwalker_cli.io.c3d_plates import centre_of_pressure, plate_axes
 
 ezc3d = pytest.importorskip("ezc3d")
 
 CORNERS = np.array([[0.6, 0.9, 0.0], [0.2, 0.9, 0.0], [0.2, 0.3, 0.0], [0.6, 0.3, 0.0]])
 FRAMES, PER_FRAME = 30, 4
-COUNTS = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
+COUNTS = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8, 21: 6}
 
 
 def channels(kind: int) -> np.ndarray:
@@ -74,7 +74,7 @@ def _whole_numbers(data: bytes) -> bytes:
 
 @pytest.mark.parametrize("kind", [1, 2, 3, 4])
 def test_forces_are_those_of_the_library(kind: int, tmp_path: Path) -> None:
-    matrix = np.eye(6) * 2.0 + 0.1 if kind == 4 else None
+    matrix = np.arange(36.0).reshape(6, 6) * 0.01 + np.eye(6) if kind == 4 else None
     path = written(tmp_path / "plate.c3d", kind, channels(kind), matrix)
     (plate,) = read_c3d(path).plates
     (library,) = ezc3d.c3d(str(path), extract_forceplat_data=True)["data"]["platform"]
@@ -100,6 +100,19 @@ def test_calibrated_plates_multiply_their_channels(
     assert plate.moment == pytest.approx(other.moment, abs=1e-3)
 
 
+def test_twelve_channels_hold_the_three_forces_of_every_corner(tmp_path: Path) -> None:
+    """Forces and their moments about the centre of the surface, corner by corner."""
+    values, matrix = channels(6), np.random.default_rng(1).normal(size=(12, 12))
+    (plate,) = read_c3d(written(tmp_path / "a.c3d", 6, values, matrix)).plates
+    corners = np.array([[0.15, 0.2], [-0.15, 0.2], [-0.15, -0.2], [0.15, -0.2]])
+    levers = np.column_stack([corners, np.full(4, 0.03)])  # ORIGIN goes from sensors to surface
+    forces = (values @ matrix.T).reshape(-1, 4, 3)
+    axes = plate_axes(CORNERS)
+    assert plate.force == pytest.approx(forces.sum(axis=1) @ axes, abs=1e-3)
+    moment = np.cross(levers, forces).sum(axis=1)
+    assert plate.moment == pytest.approx(moment @ axes, abs=1e-3)
+
+
 def test_sensors_stored_above_the_surface_are_below_it(tmp_path: Path) -> None:
     """The library turns the sensors' distances round with the depth, and the moments with them."""
     up = np.array([[150.0], [200.0], [30.0]])
@@ -119,7 +132,8 @@ def test_moments_in_their_own_unit(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("kind", "other", "words"),
     [
-        (6, {}, "it is of type 6; allowed: types 1, 2, 3, 4, 5, 7"),
+        (21, {}, "it is of type 21; allowed: types 1, 2, 3, 4, 5, 6, 7"),
+        (6, {}, "it has no CAL_MATRIX of 12 x 12"),
         (7, {}, "it has no CAL_MATRIX of 8 x 8"),
         (2, {"CHANNEL": np.array([[1], [2], [3], [4], [5], [60]])}, "names channels that are not"),
         (2, {"CORNERS": np.zeros((3, 4, 0))}, "lacks channels, corners or origin"),

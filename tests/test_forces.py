@@ -18,6 +18,8 @@ from pathwalker_cli.inverse.forces import (
     centre_of_pressure,
     foot_extents,
     ground_forces,
+    plate_direction,
+    plate_loads,
 )
 from pathwalker_cli.inverse.published import wrench_axis_at_ground
 from pathwalker_cli.inverse.study import RecordedConfig
@@ -136,7 +138,8 @@ def test_force_of_a_clean_stance() -> None:
     model, motion, heel = standing()
     forces = ground_forces(recording(), model, motion)
     assert [item.reason for item in forces.stances] == [""]
-    assert forces.direction == "+x"
+    feet = foot_extents(model, motion.values)
+    assert plate_direction(plate_loads(recording()), feet, recording().events) == "+x"
     weight = GRAVITY * pin.computeTotalMass(model)
     right, left = (forces.table.select((f"force_{s}_x", f"force_{s}_z")).values for s in ("r", "l"))
     assert right[40:80, 1] == pytest.approx(weight, rel=0.01)
@@ -152,7 +155,7 @@ def test_force_of_a_clean_stance() -> None:
     ("made", "reason"),
     [
         ({"share": 0.2}, "no plate below the foot"),
-        ({"share": 0.7}, "carries 70% of the body"),
+        ({"share": 0.7}, "carries 70 % of the body"),
         ({"shift": 0.3}, "load not under the foot"),
         ({"late": 15}, "loaded before or after"),
     ],
@@ -263,9 +266,11 @@ def test_recorded_stances(trial: str, direction: str, measured: str) -> None:
     patient = load_patient("sreenivasa2017-patient")
     condition = "orthosis" if trial.startswith("orthosis") else "barefoot"
     config = RecordedConfig(patient=patient.id)
-    ((walk, read),) = c3d_trials(RECORDINGS / f"{trial}.c3d", patient, condition, config)
-    forces = ground_forces(read, pinocchio_model(patient, condition), walk.motion)
-    assert forces.direction == direction
+    ((walk, read),) = c3d_trials([RECORDINGS / f"{trial}.c3d"], patient, condition, config)
+    model = pinocchio_model(patient, condition)
+    forces = ground_forces(read, model, walk.motion)
+    feet = foot_extents(model, walk.motion.values)
+    assert plate_direction(plate_loads(read), feet, read.events) == direction
     assert forces.stances == walk.stances
     found = [item for item in walk.stances if item.measured]
     assert "".join(item.stance.side[0] for item in found) == measured

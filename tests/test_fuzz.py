@@ -300,7 +300,7 @@ def test_recordings_with_anything_in_them_are_evaluated_or_refused(seed: int) ->
     patient, config = load_patient("sreenivasa2017-patient"), RecordedConfig(patient="")
 
     def read(path: Path) -> None:
-        for trial, _ in c3d_trials(path, patient, "barefoot", config):
+        for trial, _ in c3d_trials([path], patient, "barefoot", config):
             assert np.isfinite(trial.motion.values).all()
             assert all(map(str.isprintable, (*trial.remarks, *stance_notes(trial), *trial.doubts)))
 

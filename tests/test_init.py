@@ -238,7 +238,7 @@ def test_made_recordings_say_so_and_give_back_the_motion(tmp_path: Path) -> None
     path = tmp_path / "made.c3d"
     example.write_c3d(path, recording, description="Made by PathWalker; not recorded")
     assert "not recorded" in ezc3d.c3d(str(path))["parameters"]["TRIAL"]["DESCRIPTION"]["value"][0]
-    ((trial, _),) = c3d_trials(path, patient, "barefoot", RecordedConfig(patient=patient.id))
+    ((trial, _),) = c3d_trials([path], patient, "barefoot", RecordedConfig(patient=patient.id))
     assert 0.5e-3 < trial.markers.mean < 2e-3, "what remains is the noise"
     assert [s.measured for s in trial.stances if s.plate is not None] == [True]
     assert trial.forces is not None

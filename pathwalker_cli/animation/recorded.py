@@ -83,10 +83,11 @@ def _of_c3d(walker: Walker, path: Path) -> list[tuple[Trial, dict[str, np.ndarra
     config = RecordedConfig(
         patient=patient.id, conditions=(condition,), c3d=Paths(**{condition: (str(path),)})
     )
-    raw, _, points = read_markers(path, patient, condition, config)
-    names = [point.marker for point in points]
-    trials = [trial for trial, _ in c3d_trials(path, patient, condition, config)]
-    paths = [{n: walk.marker(n)[:, [0, 2]] for n in names} for walk in walks(raw, points)]
+    file = read_markers(path, patient, condition, config)
+    names = [point.marker for point in file.points]
+    trials = [trial for trial, _ in c3d_trials([path], patient, condition, config)]
+    passes = walks(file.recording, file.points)
+    paths = [{n: walk.marker(n)[:, [0, 2]] for n in names} for walk in passes]
     return list(zip(trials, paths, strict=True))
 
 

@@ -77,7 +77,8 @@ def init_command(
     one of these is given; Enter leaves each open.
 
     With --from, body mass, height, lengths and feet are those of a recording with a marker set that
-    is recognised, and the file says where each number comes from; walks are copied to c3d/barefoot.
+    is recognised, and the file says where each number comes from; walks, and that recording with
+    them, are copied to c3d/barefoot.
     """
     from pathwalker_cli.errors import DataError
     from pathwalker_cli.io.c3d_checks import c3d_files
@@ -97,7 +98,7 @@ def init_command(
         raise DataError("is given without --from", where=str(walks[0]), mend=mend)
     else:
         child = made_child(id_, age, mass, height, **({"sex": sex} if sex else {}))
-    walks = c3d_files(walks)
+    files = c3d_files([*walks, *([source] if source and walks else [])])
     brace = "none" if without_orthosis and brace is None else brace
     given = (brace, speed, knee_flexion, *examined)
     if not example and not any(given) and _at_a_terminal():
@@ -105,7 +106,7 @@ def init_command(
     seen = seen_of(brace or "planned", speed, knee_flexion or "", examined)
     if without_orthosis and seen.with_orthosis:
         raise DataError(f"contradicts --brace {brace}", where="--without-orthosis")
-    write_folder(folder, child, seen, example, walks)
+    write_folder(folder, child, seen, example, files)
     kind = "a child" if source else "a made-up child"
     click.echo(
         f"Wrote {folder}: {kind} of {child.age:g} years, {child.body_mass:g} kg and "
@@ -164,9 +165,10 @@ def _measured_child(
             "no recording tells a child's age and sex", where="--from", mend="add --age and --sex"
         )
     body = measured_body(source, mass, height, subject)
-    for what, value in (("--mass", body.mass), ("--height", body.height)):
-        if value is None:
-            raise DataError("is not in the file", where=what, mend=f"add {what}")
+    told = {"--mass": body.mass, "--height": body.height}
+    if missing := " and ".join(option for option, value in told.items() if value is None):
+        what = f"does not tell {missing.replace('--', '')}"
+        raise DataError(what, where=str(source), mend=f"add {missing}")
     sources = ("age, sex: as given", *body.sources)
     return made_child(name, age, body.mass, body.height, sex=sex, lengths=body.lengths,
                       soles=body.soles, sources=sources)  # fmt: skip

@@ -22,10 +22,10 @@ from pathwalker_cli.conventions import CONDITIONS, Condition
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from pathwalker_cli.inverse.c3d_trials import Progress
     from pathwalker_cli.inverse.strengths import StrengthTable
     from pathwalker_cli.inverse.study import RecordedConfig
     from pathwalker_cli.inverse.trial import Trial
-    from pathwalker_cli.inverse.trials import Progress
     from pathwalker_cli.patient import Patient
 
     Config = TypeVar("Config", bound=RecordedConfig)

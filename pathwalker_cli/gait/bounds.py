@@ -174,7 +174,7 @@ def _joint_ranges(walker: Walker, config: BoundsConfig, sources: dict[str, str])
             source = f"barefoot recordings widened by {margin:g} rad"
         elif name in config.fallback_joint_ranges:
             low, high = config.fallback_joint_ranges[name]
-            source = "fallback: the patient has no recordings"
+            source = "fallback: the patient's file has no recorded ones"
         else:
             raise ConfigError(
                 f"has no range for {name}", where="bounds", mend="add it to bounds.joint_ranges"
@@ -193,7 +193,7 @@ def _least_speed(walker: Walker, config: BoundsConfig, sources: dict[str, str]) 
         speed, source = recorded.walking_speed.mean, "mean of the barefoot recordings"
     else:
         ratio, speed = config.fallback_speed_ratio, fallback_speed(walker.patient, config)
-        source = f"fallback: {ratio:g} sqrt(g barefoot leg length), the patient has no recordings"
+        source = f"fallback: {ratio:g} sqrt(g barefoot leg length), none is recorded in the file"
     sources["walking_speed"] = f"at least {speed:.3f} m/s, {source}"
     return speed
 

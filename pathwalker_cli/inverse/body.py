@@ -96,15 +96,16 @@ def measured_body(
             mend="use init without --from and measure lengths by tape",
         )
     check_markers(recording, [*known.markers.values()], height or _CHILD, path)
-    recording = _facing(recording, known)
+    recording = facing(recording, known)
     sources: list[str] = []
     mass = _told(recording, _MASS, mass, "body mass", sources)
     if mass is None:
         mass = _weighed(recording, sources)
     height = _told(recording, _HEIGHT, height, "height", sources)
+    hips = _hips(recording, known)
+    lengths = _lengths(recording, known, hips, height or _CHILD)
     if height is None:
-        height = _from_neck(recording, known, sources)
-    lengths = _lengths(recording, known, height or _CHILD)
+        height = _from_neck(recording, known, hips, lengths, sources)
     name = recording.name
     sources += [
         f"thigh, shank: {name}, hip joint centres by Davis et al. (1991)",
@@ -113,7 +114,7 @@ def measured_body(
     return Body(mass, height, lengths, _soles(recording, known, height), tuple(sources))
 
 
-def _facing(recording: Recording, known: KnownSet) -> Recording:
+def facing(recording: Recording, known: KnownSet) -> Recording:
     """Return a recording with z up and x to where the pelvis faces."""
     front, back = known.middle("asis", recording), known.middle("psis", recording)
     if not np.isfinite(front - back).any():
@@ -152,28 +153,39 @@ def _weighed(recording: Recording, sources: list[str]) -> float | None:
     return round(mean / GRAVITY, 1)
 
 
-def _from_neck(recording: Recording, known: KnownSet, sources: list[str]) -> float | None:
-    """Return the height that belongs to that of the seventh cervical vertebra, None without [m]."""
+def _from_neck(
+    recording: Recording,
+    known: KnownSet,
+    hips: Mapping[Side, np.ndarray],
+    lengths: Mapping[str, tuple[float, float]],
+    sources: list[str],
+) -> float | None:
+    """Return the height that belongs to the seventh cervical vertebra, None without it [m].
+
+    Trunk and legs are laid end to end, so that it does not matter how far the knees bend.
+    """
     marker = known.markers.get(("c7", "right"))
     if marker is None:
         return None
-    height = float(np.nanmax(recording.marker(marker)[:, 2])) / _CERVICAL
+    trunk = _apart(recording.marker(marker), (hips["right"] + hips["left"]) / 2.0)
+    legs = (sum(lengths["thigh"]) + sum(lengths["shank"])) / len(SIDES)
+    ankle = sum(_ankle_height(recording, known, side, None) for side in SIDES) / len(SIDES)
+    height = (trunk + legs + ankle) / _CERVICAL
     if not _HEIGHTS[0] <= height <= _HEIGHTS[1]:
         return None
     sources.append(
-        f"height: {marker} of {recording.name}, {_CERVICAL:g} of it (Gordon et al. 1989)"
+        f"height: {marker} of {recording.name} above straight legs, {_CERVICAL:g} of it "
+        "(Gordon et al. 1989)"
     )
     return round(height, 3)
 
 
-def _lengths(
-    recording: Recording, known: KnownSet, body_height: float
-) -> dict[str, tuple[float, float]]:
-    """Return the lengths of both sides [m], medians over the frames."""
+def _hips(recording: Recording, known: KnownSet) -> dict[Side, np.ndarray]:
+    """Return the hip joint centres [m], shape (n, 3) each."""
     front, back = known.middle("asis", recording), known.middle("psis", recording)
-    spines = [recording.marker(known.markers["asis", side]) for side in SIDES]
+    spines = {side: recording.marker(known.markers["asis", side]) for side in SIDES}
     ahead = _unit(front - back)
-    left = spines[1] - spines[0]
+    left = spines["left"] - spines["right"]
     left = left - (left * ahead).sum(axis=1, keepdims=True) * ahead
     width = _apart(left, np.zeros(3))
     if not _WIDTHS[0] <= width <= _WIDTHS[1]:
@@ -185,21 +197,29 @@ def _lengths(
         )
     left = _unit(left)
     up = np.cross(ahead, left)
+    hips = {}
+    for side, spine in spines.items():
+        knee, ankle = (recording.marker(known.markers[n, side]) for n in ("knee", "ankle"))
+        behind, aside, below = hip_centre(_apart(spine, knee) + _apart(knee, ankle), width)
+        hips[side] = front - behind * ahead + LEFTWARD[side] * aside * left - below * up
+    return hips
+
+
+def _lengths(
+    recording: Recording, known: KnownSet, hips: Mapping[Side, np.ndarray], body_height: float
+) -> dict[str, tuple[float, float]]:
+    """Return the lengths of both sides [m], medians over the frames."""
     every: dict[str, list[float]] = {"thigh": [], "shank": [], "foot": []}
-    for side, spine in zip(SIDES, spines, strict=True):
-        knee = recording.marker(known.markers["knee", side])
-        ankle = recording.marker(known.markers["ankle", side])
-        leg = _apart(spine, knee) + _apart(knee, ankle)
-        behind, aside, below = hip_centre(leg, width)
-        hip = front - behind * ahead + LEFTWARD[side] * aside * left - below * up
-        toe = recording.marker(known.markers["toe", side])
+    for side, hip in hips.items():
+        knee, ankle, toe = (
+            recording.marker(known.markers[n, side]) for n in ("knee", "ankle", "toe")
+        )
         heel = known.markers.get(("heel", side))
         beside = beside_joint("knee", side, body_height, recording.numbers)
         every["thigh"].append(round(float(np.sqrt(_apart(hip, knee) ** 2 - beside**2)), 3))
         every["shank"].append(_apart(knee, ankle))
-        every["foot"].append(
-            _apart(recording.marker(heel), toe) if heel else _apart(ankle, toe) / _TO_TOE
-        )
+        foot = _apart(recording.marker(heel), toe) if heel else _apart(ankle, toe) / _TO_TOE
+        every["foot"].append(round(foot, 3))
     lost = [name for name, values in every.items() if not np.isfinite(values).all()]
     if lost:
         raise DataError(f"never shows both ends of the {lost[0]} at once", where=recording.name)
@@ -213,14 +233,20 @@ def _soles(
     places = foot_places(known, recording)
     soles: dict[Side, dict[str, tuple[float, float]]] = {}
     for side in SIDES:
-        ankle = float(np.nanquantile(recording.marker(known.markers["ankle", side])[:, 2], _LOWEST))
-        if not _ANKLES[0] <= ankle <= _ANKLES[1]:
-            ankle = ANKLE_HEIGHT * height if height else _ANKLE
+        ankle = _ankle_height(recording, known, side, height)
         toe = places["toe", side][0]
         heel = places.get(("heel", side), (-_TO_HEEL * toe, 0.0))[0]
         soles[side] = {"heel": (round(heel, 3), -round(ankle, 3)),
                        "toe": (round(toe, 3), -round(ankle, 3))}  # fmt: skip
     return soles
+
+
+def _ankle_height(recording: Recording, known: KnownSet, side: Side, height: float | None) -> float:
+    """Return how high an ankle is over its sole [m]; by the height where z = 0 is no floor."""
+    ankle = float(np.nanquantile(recording.marker(known.markers["ankle", side])[:, 2], _LOWEST))
+    if _ANKLES[0] <= ankle <= _ANKLES[1]:
+        return ankle
+    return ANKLE_HEIGHT * height if height else _ANKLE
 
 
 def _apart(one: np.ndarray, other: np.ndarray) -> float:

@@ -187,13 +187,8 @@ def cycle_band(trials: Sequence[tuple[Trajectory, tuple[GaitCycle, ...]]], side:
         raise DataError(f"the trials show no complete gait cycle of the {side} side")
     stacked = np.array([resampled(curve.values[cycle.rows]) for curve, cycle in own])
     toe_off = 100.0 * float(np.mean([(c.toe_off - c.start) / (c.end - c.start) for _, c in own]))
-    known = np.isfinite(stacked)
-    count = known.sum(axis=0)
-    with np.errstate(invalid="ignore"):
-        mean = np.where(known, stacked, 0.0).sum(axis=0) / count
-        square = (np.where(known, stacked - mean, 0.0) ** 2).sum(axis=0) / count
-    lowest = np.where(known, stacked, np.inf).min(axis=0)
-    highest = np.where(known, stacked, -np.inf).max(axis=0)
-    lowest[count == 0] = highest[count == 0] = np.nan
-    names = trials[0][0].names
-    return CycleBand(names, mean, np.sqrt(square), lowest, highest, count, toe_off)
+    known = np.ma.masked_invalid(stacked)
+    over = (known.mean(axis=0), known.std(axis=0), known.min(axis=0), known.max(axis=0))
+    mean, deviation, lowest, highest = (np.ma.filled(each, np.nan) for each in over)
+    count = known.count(axis=0)
+    return CycleBand(trials[0][0].names, mean, deviation, lowest, highest, count, toe_off)

@@ -164,7 +164,7 @@ def _write_residuals(path: Path, tables: Sequence[ResidualTable]) -> None:
             values = [*item.mean, *item.rms, *(item.mean / table.body_mass)]
             row = [item.trial, item.frames, *(as_text(value, 5) for value in values)]
             rows.append([table.condition, table.part, *row])
-        for name, mean in table.range.items() if table.range else ():
+        for name, mean in table.range.items():
             values = [*mean, *[None] * len(COMPONENTS), *(mean / table.body_mass)]
             row = [f"{name} over trials", None, *(as_text(value, 5) for value in values)]
             rows.append([table.condition, table.part, *row])

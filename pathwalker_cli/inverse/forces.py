@@ -40,6 +40,8 @@ _TOES: Final = 0.39
 """How far toes reach beyond the toe marker on the second metatarsal head, as a share of heel to toe
 marker: the head lies at 72 % of the foot's length."""
 
+_HOW_TO_MEND: Final = "; import --mend-plates, or mend_plates: true in a config, mends it"
+
 _HEADINGS: Final = {"+x": (1.0, 0.0), "-x": (-1.0, 0.0), "+y": (0.0, 1.0), "-y": (0.0, -1.0)}
 
 
@@ -51,14 +53,12 @@ class GroundForces:
         table: Columns of `FORCE_COLUMNS` in every frame, NaN where not measured (centre of
             pressure: or without load).
         stances: What is known about every stance.
-        direction: Axis of the plates along which the patient walks, e.g. "-y".
         remarks: What was found wrong with the plates, a sentence each.
         loads: The plates with x along the walk and their loads in every frame, filtered.
     """
 
     table: Trajectory
     stances: tuple[StanceForce, ...]
-    direction: str = "+x"
     remarks: tuple[str, ...] = ()
     loads: tuple[ForcePlate, ...] = ()
 
@@ -100,7 +100,7 @@ def ground_forces(
     """
     if not recording.plates:
         raise DataError("has no force plates", where=recording.name)
-    feet, direction = foot_extents(model, motion.values), "+x"
+    feet = foot_extents(model, motion.values)
     if ahead is not None:
         feet = {side: ends + ahead[side][:, None] for side, ends in feet.items()}
     loads = plate_loads(recording)
@@ -111,10 +111,8 @@ def ground_forces(
     weight = GRAVITY * pin.computeTotalMass(model)
     prints = _footprints(model, feet, aside)
     faults = plate_faults(loads, stances(recording.events), prints, weight)
-    remarks = tuple(
-        f"{loads[fault.plate].name} is {'mended' if mend else 'not used'}: {fault.what}"
-        for fault in faults
-    )
+    done, how = ("mended", "") if mend else ("not used", _HOW_TO_MEND)
+    remarks = tuple(f"{loads[f.plate].name} is {done}: {f.what}{how}" for f in faults)
     for fault in faults if mend else ():
         loads[fault.plate] = fault.mended
     points = np.stack([centre_of_pressure(load, LOADED)[:, 0] for load in loads], axis=1)
@@ -130,7 +128,7 @@ def ground_forces(
     )
     judged = tuple(judge(stance, seen) for stance in stances(recording.events))
     table = _compose(recording, judged, [load.force[:, [0, 2]] for load in loads], points, ahead)
-    return GroundForces(table, judged, direction, remarks, tuple(loads))
+    return GroundForces(table, judged, remarks, tuple(loads))
 
 
 def plate_loads(recording: Recording, cutoff: float = FORCE_CUTOFF) -> list[ForcePlate]:

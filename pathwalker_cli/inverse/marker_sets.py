@@ -33,19 +33,15 @@ _NEEDED: Final[tuple[Landmark, ...]] = ("asis", "psis", "knee", "ankle", "toe")
 
 _FEET: Final[tuple[Landmark, ...]] = ("toe", "heel")
 
+_PLUG_IN_GAIT: Final[Mapping[Landmark, tuple[str, ...]]] = {
+    "asis": ("{}ASI",), "psis": ("{}PSI",), "knee": ("{}KNE",), "ankle": ("{}ANK",),
+    "toe": ("{}TOE",), "heel": ("{}HEE",), "c7": ("C7",), "clavicle": ("CLAV", "{}CLA"),
+}  # fmt: skip
+
 _LANDMARKS: Final[Mapping[str, Mapping[Landmark, tuple[str, ...]]]] = {
-    "Plug-in Gait": {
-        "asis": ("{}ASI",), "psis": ("{}PSI",), "knee": ("{}KNE",), "ankle": ("{}ANK",),
-        "toe": ("{}TOE",), "heel": ("{}HEE",), "c7": ("C7",), "clavicle": ("CLAV", "{}CLA"),
-    },
-    "Plug-in Gait with a sacral marker": {
-        "asis": ("{}ASI",), "psis": ("SACR",), "knee": ("{}KNE",), "ankle": ("{}ANK",),
-        "toe": ("{}TOE",), "heel": ("{}HEE",), "c7": ("C7",), "clavicle": ("CLAV", "{}CLA"),
-    },
-    "CGM2": {
-        "asis": ("{}ASI",), "psis": ("{}PSI",), "knee": ("{}KNE",), "ankle": ("{}ANK",),
-        "toe": ("{}SMH",), "heel": ("{}HEE",), "c7": ("C7",), "clavicle": ("CLAV", "{}CLA"),
-    },
+    "Plug-in Gait": _PLUG_IN_GAIT,
+    "Plug-in Gait with a sacral marker": {**_PLUG_IN_GAIT, "psis": ("SACR",)},
+    "CGM2": {**_PLUG_IN_GAIT, "toe": ("{}SMH",)},
     "Helen Hayes": {
         "asis": ("{}.ASIS", "{}ASIS"), "psis": ("V.Sacral", "Sacral", "SACRAL"),
         "knee": ("{}.Knee", "{}.Knee.Lat"), "ankle": ("{}.Ankle", "{}.Ankle.Lat"),
@@ -84,6 +80,10 @@ time it does."""
 _LEVEL: Final = 0.18
 """Slope of heel to toe marker up to which a foot counts as flat on the ground [rad]; both are put
 on at one height."""
+
+
+FootPlaces = Mapping[tuple[Landmark, Side], tuple[float, float]]
+"""Toe and heel markers before and above the ankle of a foot that stands flat [m]."""
 
 
 @dataclass(frozen=True)
@@ -169,6 +169,7 @@ def set_points(
     patient: Patient | None = None,
     recording: Recording | None = None,
     condition: Condition = "barefoot",
+    feet: FootPlaces | None = None,
 ) -> tuple[MarkerPoint, ...]:
     """Return where the markers of a known set sit on a patient's walker.
 
@@ -178,6 +179,8 @@ def set_points(
         recording: A pass in the walking plane, which tells the depth of the pelvis and where the
             foot markers are around the ankles; without it these are 0.
         condition: What is worn: a shoe that stands flat may hold the foot at a pitch.
+        feet: Where the foot markers are, as `foot_places` returns it, if the recording shall not
+            tell.
     """
     points: dict[tuple[str, str], MarkerPoint] = {}
 
@@ -191,7 +194,8 @@ def set_points(
                       for n in ("thigh", "shank"))  # fmt: skip
     height = patient.height if patient else 0.0
     depth = _pelvis_depth(known, recording) if recording else 0.0
-    feet = foot_places(known, recording) if recording else {}
+    if recording and not feet:
+        feet = foot_places(known, recording)
     for side in SIDES:
         add("asis", side, "pelvis", asis)
         add("psis", side, "pelvis", (asis[0] - depth, asis[1]))
@@ -200,7 +204,7 @@ def set_points(
         add("ankle", side, f"shank_{suffix}", (0.0, -shanks[side]))
         add("ankle", side, f"foot_{suffix}", (0.0, 0.0))
         for landmark in _FEET:
-            at = feet.get((landmark, side), (0.0, 0.0))
+            at = (feet or {}).get((landmark, side), (0.0, 0.0))
             if patient:
                 at = _pitched(at, patient.contacts(condition)[side])
             add(landmark, side, f"foot_{suffix}", at)
@@ -236,11 +240,7 @@ def _pelvis_depth(known: KnownSet, recording: Recording) -> float:
 
 
 def _require_seen(frames: np.ndarray, what: str, recording: Recording) -> None:
-    """Refuse a recording in which no frame shows what is measured.
-
-    Raises:
-        DataError: If so.
-    """
+    """Refuse a recording in which no frame shows what is measured."""
     if not frames.any():
         raise DataError(
             f"shows {what} in no frame at once",
@@ -249,9 +249,7 @@ def _require_seen(frames: np.ndarray, what: str, recording: Recording) -> None:
         )
 
 
-def foot_places(
-    known: KnownSet, recording: Recording
-) -> dict[tuple[Landmark, Side], tuple[float, float]]:
+def foot_places(known: KnownSet, recording: Recording) -> FootPlaces:
     """Return toe and heel markers before and above the ankle of a foot that stands flat [m].
 
     Of a foot that never does, heel and toe marker are taken to be at one height; without a heel

@@ -65,10 +65,9 @@ def robust_kinematics(
         motion, residuals = inverse_kinematics(model, recording, points)
     wands = _wands(points, residuals)
     if wands:
-        away_from_bone = ", ".join(p.marker for p in points if p.name in wands)
+        left_out = ", ".join(p.marker for p in points if p.name in wands)
         doubts.append(
-            f"markers {away_from_bone} stand far beside the line between the joints, as on wands: "
-            "they are left out"
+            f"left out, as if on wands far beside the line between the joints: {left_out}"
         )
         points = tuple(p for p in points if p.name not in wands)
         motion, residuals = inverse_kinematics(model, recording, points)

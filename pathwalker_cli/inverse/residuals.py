@@ -41,19 +41,6 @@ class Residuals:
 
 
 @dataclass(frozen=True)
-class ResidualRange:
-    """Mean, lowest and highest of the trials' mean residuals, each of shape (3,)."""
-
-    mean: np.ndarray
-    lowest: np.ndarray
-    highest: np.ndarray
-
-    def items(self) -> tuple[tuple[str, np.ndarray], ...]:
-        """Return the three with the names that tables give them."""
-        return ("mean", self.mean), ("min", self.lowest), ("max", self.highest)
-
-
-@dataclass(frozen=True)
 class ResidualTable:
     """Residuals of one condition in one part of the gait cycle.
 
@@ -62,14 +49,15 @@ class ResidualTable:
         part: "whole cycle": frames of complete gait cycles in which all forces are known; "single
             support": those of them in which one foot is in the air.
         trials: Residuals of the trials that show any such frame.
-        range: Mean, lowest and highest over the trials with enough frames, None if there are none.
+        range: "mean", "min" and "max" of the means of the trials with enough frames, shape (3,)
+            each; empty if there are none.
         body_mass: Mass to divide by for N/kg and N m/kg [kg].
     """
 
     condition: Condition
     part: Part
     trials: tuple[Residuals, ...]
-    range: ResidualRange | None
+    range: Mapping[str, np.ndarray]
     body_mass: float
 
 
@@ -86,13 +74,12 @@ def residuals(trial: str, tau: np.ndarray, frames: np.ndarray | None = None) -> 
     return Residuals(trial, known.mean(axis=0), np.sqrt((known**2).mean(axis=0)), len(known))
 
 
-def residual_range(trials: Sequence[Residuals], per: float = 1.0) -> ResidualRange:
-    """Return mean and extremes over trials that have any known frame, per mass [kg].
-
-    The published table 3 gives N/kg and N m/kg as N and N m.
-    """
-    means = np.array([item.mean for item in trials if item.frames]) / per
-    return ResidualRange(means.mean(axis=0), means.min(axis=0), means.max(axis=0))
+def residual_range(trials: Sequence[Residuals], least_frames: int = 1) -> dict[str, np.ndarray]:
+    """Return "mean", "min" and "max" of the means of trials with so many frames, if any has."""
+    means = np.array([item.mean for item in trials if item.frames >= least_frames])
+    if not means.size:
+        return {}
+    return {"mean": means.mean(axis=0), "min": means.min(axis=0), "max": means.max(axis=0)}
 
 
 def residual_tables(
@@ -104,8 +91,7 @@ def residual_tables(
         own = [t for t in trials if t.condition == condition and t.tau is not None]
         for part in get_args(Part):
             rows = tuple(row for trial in own if (row := trial_residuals(trial, part)).frames)
-            enough = [row for row in rows if row.frames >= config.least_frames]
-            span = residual_range(enough) if enough else None
+            span = residual_range(rows, config.least_frames)
             tables.append(ResidualTable(condition, part, rows, span, patient.body_mass))
     return tuple(tables)
 
@@ -159,6 +145,6 @@ def study_warnings(
         f"{patient.body_mass:g} kg and the segment lengths of patient {patient.id} those of this "
         "recording?"
         for table in tables
-        if table.part == "single support" and table.range is not None
-        if abs(up := table.range.mean[list(COMPONENTS).index("up")]) > share * weight
+        if table.part == "single support" and table.range
+        if abs(up := table.range["mean"][list(COMPONENTS).index("up")]) > share * weight
     )

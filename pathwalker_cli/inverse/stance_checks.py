@@ -125,7 +125,8 @@ def _doubts(stance: Stance, plate: int, seen: Evidence) -> Iterator[str]:
     single = single_support(stance, seen.events)
     share = float(load[single].mean() / seen.carried[single].mean()) if single.size else 0.0
     if not SUPPORT[0] < share < SUPPORT[1]:
-        yield f"{name} carries {share:.0%} of the body in single support"
+        usual = f"{100 * SUPPORT[0]:.0f} to {100 * SUPPORT[1]:.0f} %"
+        yield f"{name} carries {100 * share:.0f} % of the body in single support, not {usual}"
 
 
 def _struck(plate: int, strike: int, side: Side, seen: Evidence) -> bool:

@@ -55,11 +55,7 @@ class RecordedConfig(YamlModel):
         return tuple(condition for condition in self.conditions if self.c3d.of(condition))
 
     def require_c3d(self, where: str) -> None:
-        """Refuse a config that names no C3D file.
-
-        Raises:
-            ConfigError: If it names none.
-        """
+        """Refuse a config that names no C3D file."""
         if not self.recorded_conditions:
             raise ConfigError(
                 f"names no C3D file of {' or '.join(self.conditions)}",

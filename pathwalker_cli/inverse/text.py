@@ -71,7 +71,7 @@ def dynamics_content(tables: Iterable[ResidualTable], strengths: StrengthTable) 
                 "condition": table.condition,
                 "part": table.part,
                 "trials": len(table.trials),
-                "forward_up_moment": None if table.range is None else table.range.mean.tolist(),
+                "forward_up_moment": table.range["mean"].tolist() if table.range else None,
             }
             for table in tables
         ],
@@ -93,10 +93,9 @@ def residuals_renderable(tables: Sequence[ResidualTable]) -> Table:
         table.add_row(f"{block.condition}, {block.part}", style="bold")
         for item in block.trials:
             table.add_row(f"  {item.trial}", str(item.frames), *_values(item.mean, 2))
-        spans = block.range.items() if block.range else ()
-        for name, mean in spans:
+        for name, mean in block.range.items():
             table.add_row(f"  {name} over trials", "", *_values(mean, 2), style="bold")
-        for name, mean in spans:
+        for name, mean in block.range.items():
             per_kg = _values(mean / block.body_mass, 3)
             table.add_row(f"  {name} per kg of body mass", "", *per_kg, style="dim")
         table.add_section()
@@ -129,9 +128,9 @@ def _table(
     """Return an empty table with columns of names, and of numbers at the right."""
     table = Table(title=title, title_justify="left")
     for head in names:
-        table.add_column(head, no_wrap=True)
-    for head in numbers:
-        table.add_column(head, justify="right", no_wrap=no_wrap)
+        table.add_column(Text(head), no_wrap=True)
+    for head in numbers:  # as text: Table would take [mm] for a style
+        table.add_column(Text(head), justify="right", no_wrap=no_wrap)
     return table
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import Condition, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.inverse.c3d_trials import c3d_trials
+from pathwalker_cli.inverse.c3d_trials import Progress, c3d_trials
 from pathwalker_cli.inverse.cycles import Stance, gait_cycles, stances
 from pathwalker_cli.inverse.dynamics import (
     MOTION_CUTOFF,
@@ -23,7 +23,6 @@ from pathwalker_cli.inverse.published import AVERAGED_TRIALS, flagged_cycles, pu
 from pathwalker_cli.inverse.stance_checks import StanceForce
 from pathwalker_cli.inverse.study import InverseDynamicsConfig, RecordedConfig
 from pathwalker_cli.inverse.trial import Trial
-from pathwalker_cli.inverse.walk import StandingError
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.c3d_checks import c3d_files, require_plates
 from pathwalker_cli.io.recordings import (
@@ -39,9 +38,6 @@ from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 from pathwalker_cli.trajectory import Trajectory
 
-Progress = Callable[[str], None]
-"""Called with "barefoot 3053179" before a trial is evaluated."""
-
 
 def kinematics_trials(
     config: RecordedConfig, patient: Patient, progress: Progress = print
@@ -53,41 +49,10 @@ def kinematics_trials(
     """
     trials: list[Trial] = []
     for condition in config.recorded_conditions:
-        trials += [trial for trial, _ in _walks(config, patient, condition, progress)]
+        files = c3d_files(config.c3d.of(condition))
+        found = c3d_trials(files, patient, condition, config, progress=progress)
+        trials += [trial for trial, _ in found]
     return tuple(trials)
-
-
-def _walks(
-    config: RecordedConfig,
-    patient: Patient,
-    condition: Condition,
-    progress: Progress,
-    wanted: Callable[[str], bool] = lambda _: True,
-) -> list[tuple[Trial, Recording]]:
-    """Return the trials of one condition; files in which nobody walks are set aside.
-
-    Raises:
-        DataError: If a recording cannot be used, or nobody walks in any.
-    """
-    found: list[tuple[Trial, Recording]] = []
-    still: list[StandingError] = []
-    files = c3d_files(config.c3d.of(condition))
-    for path in files:
-        if wanted(path.stem):
-            progress(f"{condition} {path.stem}")
-            others = [file.stem for file in files if file != path]
-            try:
-                found += c3d_trials(path, patient, condition, config, others)
-            except StandingError as error:
-                still.append(error)
-    if still and not found:
-        raise still[0]
-    if still:
-        aside = tuple(f"{error.where} is set aside: its {error.what}" for error in still)
-        first, recording = found[0]
-        walk = first.walk and replace(first.walk, remarks=(*first.remarks, *aside))
-        found[0] = replace(first, walk=walk), recording
-    return found
 
 
 def dynamics_trials(
@@ -112,25 +77,26 @@ def _c3d_dynamics(
 ) -> list[Trial]:
     """Return the trials of one condition from C3D files."""
     published = config.method == "published"
-
-    def wanted(name: str) -> bool:
-        ours = not published or name in AVERAGED_TRIALS[condition]
-        return ours and (not config.trials or name in config.trials)
-
+    files = c3d_files(config.c3d.of(condition))
+    if published:
+        averaged = AVERAGED_TRIALS[condition]
+        names = [name for name in averaged if not config.trials or name in config.trials]
+        used = [file for file in files if file.stem in names]
+        if files and not used:
+            raise DataError(
+                f"none of the {len(files)} {condition} files is a trial of the published tables",
+                allowed=", ".join(averaged),
+                mend="use method default for other recordings",
+            )
+        files = tuple(used)
     trials = []
-    for trial, recording in _walks(config, patient, condition, progress, wanted):
+    found = c3d_trials(files, patient, condition, config, config.trials, progress)
+    for trial, recording in found:
         require_plates(recording)
         if published:
             trials.append(_published(trial, recording, patient))
         else:
             trials.append(with_torques(trial, patient, config.motion_cutoff))
-    files = c3d_files(config.c3d.of(condition))
-    if files and not trials and published:
-        raise DataError(
-            f"none of the {len(files)} {condition} files is a trial of the published tables",
-            allowed=", ".join(AVERAGED_TRIALS[condition]),
-            mend="use method default for other recordings",
-        )
     return trials
 
 
@@ -235,11 +201,7 @@ def recorded_stances(recording: CompactRecording) -> tuple[StanceForce, ...]:
 
 
 def require_trials(config: InverseDynamicsConfig, patient: Patient) -> None:
-    """Refuse a study without trials, or with names of trials that are not there.
-
-    Raises:
-        DataError: If so.
-    """
+    """Refuse a study without trials, or with names of trials that are not there."""
     there: list[str] = []
     for condition in config.conditions:
         if config.source == "c3d":
@@ -265,7 +227,12 @@ def _require_forces(trials: Sequence[Trial]) -> None:
         return
     first = trials[0].name
     if all(trial.tau is None for trial in trials):
-        raise DataError("no trial has ground forces", where=first, mend="import C3D files")
+        raise DataError(
+            "no trial has ground forces",
+            where=first,
+            allowed="recordings with force plates",
+            mend="import such, or use ik for joint angles alone",
+        )
     among = f" of {len(trials)} trials" if len(trials) > 1 else ""
     reasons = sorted({item.reason for item in stances if item.reason})
     raise DataError(

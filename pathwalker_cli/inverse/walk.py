@@ -63,7 +63,7 @@ def walks(
             f"{', '.join(dict.fromkeys(_on(points, 'pelvis')))} travel {travel:.2f} m",
             where=recording.name,
             allowed=f"at least {SHORTEST_WALK} m, so that the walking direction is certain",
-            mend="walks on a treadmill cannot be read" if _swings(recording, points) else "",
+            mend="walks on a treadmill cannot be read" if feet_move(recording, points) else "",
         )
     if len(runs) == 1:
         return (turned(recording, _heading(path)),)
@@ -214,7 +214,7 @@ def upright(recording: Recording, points: tuple[MarkerPoint, ...]) -> Recording:
     return replace(upright, remarks=(*recording.remarks, remark))
 
 
-def _swings(recording: Recording, points: tuple[MarkerPoint, ...]) -> bool:
+def feet_move(recording: Recording, points: tuple[MarkerPoint, ...]) -> bool:
     """Return whether a foot goes to and fro, however little the pelvis travels."""
     foot = recording.marker(_on(points, "foot_r")[0])[:, :2]
     seen = foot[np.isfinite(foot[:, 0])]

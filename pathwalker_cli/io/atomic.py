@@ -43,11 +43,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 
 def check_room(folder: Path) -> None:
-    """Refuse a full disk before the work whose results it would take; the folder may be missing.
-
-    Raises:
-        DataError: If there is hardly any room.
-    """
+    """Refuse a full disk before the work whose results it would take; the folder may be missing."""
     above = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     free = shutil.disk_usage(above).free
     if free < _LEAST_ROOM:

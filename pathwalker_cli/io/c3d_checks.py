@@ -74,9 +74,6 @@ def check_markers(recording: Recording, names: Sequence[str], height: float, pat
     """Refuse a recording that lacks markers, or whose markers or plates cannot be right.
 
     The height is that of the patient [m].
-
-    Raises:
-        DataError: If so.
     """
     names = tuple(dict.fromkeys(names))
     _check_markers(recording, names, path)
@@ -85,16 +82,12 @@ def check_markers(recording: Recording, names: Sequence[str], height: float, pat
 
 
 def require_plates(recording: Recording) -> None:
-    """Refuse a recording without force plates.
-
-    Raises:
-        DataError: If there are none.
-    """
+    """Refuse a recording without force plates."""
     if not recording.plates:
         raise DataError(
             "has no force plates that can be read",
             where=recording.name,
-            allowed="plates of types 1 to 5 and 7 with their channels",
+            allowed="plates of types 1 to 7 with their channels",
             mend="use ik for joint angles alone, or export the analog channels too",
         )
 

@@ -4,12 +4,13 @@ The formulas are those of ezc3d's own reader, which refuses too much of what lab
 (counts stored as floats, one unknown plate among known ones) and reads unsigned offsets wrongly.
 
 References:
-    The C3D file format, user guide (Motion Lab Systems): FORCE_PLATFORM, types 1 to 7.
+    The C3D file format, user guide (Motion Lab Systems): FORCE_PLATFORM, types 1 to 4.
+    Visual3D documentation (HAS-Motion), FP_TYPE: channels and matrices of types 1 to 7.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -24,11 +25,11 @@ METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 LOADED: Final = 20.0
 """Vertical force from which a plate counts as loaded [N]; about ten times its noise."""
 
-_CHANNELS: Final = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 7: 8}
+_CHANNELS: Final = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
 """Channels of the types that are read."""
 
-_CALIBRATED: Final = {4: (6, 6), 5: (6, 8), 7: (8, 8)}
-"""Shape of the matrix that the channels of a type are multiplied with."""
+_ROWS: Final = {4: 6, 5: 6, 6: 12, 7: 8}
+"""Rows of the matrix that the channels of a type are multiplied with."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class ForcePlate:
         corners: Corners 1 to 4 in the laboratory [m], shape (4, 3).
         force: Ground reaction force on the body [N], laboratory axes, shape (samples, 3).
         moment: Moment about the centre of the surface [N m], laboratory axes, shape (samples, 3).
-        origin: Where the sensors' level lies from that centre [m], laboratory axes, shape (3,).
+        origin: From the sensors' level to that centre [m], laboratory axes, shape (3,).
     """
 
     name: str
@@ -88,12 +89,13 @@ def read_plates(content: Any, unit: float) -> tuple[tuple[ForcePlate, ...], tupl
     if not used.size or not int(used[0]) or not content["data"]["analogs"].size:
         return (), ()
     analog, plates, remarks = analog_channels(content), [], []
+    units = [str(text) for text in continued(content["parameters"]["ANALOG"], "UNITS")]
     for index in range(int(used[0])):
         name = f"plate {index + 1}"
         kinds = np.atleast_1d(group["TYPE"]["value"])
         kind = int(kinds[index]) if index < kinds.size else 0
         try:
-            plates.append(_plate(name, kind, _parameters(group, index), analog, content, unit))
+            plates.append(_plate(name, kind, _parameters(group, index), analog, units, unit))
         except DataError as problem:
             remarks.append(f"{name} is left out: it {problem}")
         except (LookupError, ValueError):
@@ -118,67 +120,62 @@ def _plate(
     kind: int,
     values: Mapping[str, np.ndarray],
     analog: np.ndarray,
-    content: Any,
+    units: Sequence[str],
     unit: float,
 ) -> ForcePlate:
-    """Return one plate from its parameters and all analog channels, shape (samples, channels)."""
+    """Return one plate from its parameters, all channels (samples, channels) and their units."""
     if kind not in _CHANNELS:
-        allowed = f"types {', '.join(map(str, _CHANNELS))}"
-        raise DataError(f"is of type {kind}", allowed=allowed)
-    columns = values["CHANNEL"][: _CHANNELS[kind]].astype(int) - 1
-    if columns.size < _CHANNELS[kind] or columns.min() < 0 or columns.max() >= analog.shape[1]:
-        raise DataError(f"names channels that are not there, and type {kind} has {_CHANNELS[kind]}")
-    channels = analog[:, columns]
-    if kind in _CALIBRATED:
-        rows, count = _CALIBRATED[kind]
-        if "CAL_MATRIX" not in values or min(values["CAL_MATRIX"].shape) < min(rows, count):
-            raise DataError(f"has no CAL_MATRIX of {rows} x {count}")
-        channels = channels @ values["CAL_MATRIX"][:rows, :count].T
-    # in files of some programs the sensors seem to lie above the surface
-    origin = values["ORIGIN"] * unit
-    origin = np.negative(origin) if origin[2] > 0.0 else origin
-    if kind in (3, 7):
-        wrench = _wrench_of_eight(channels, *np.abs(origin[:2]))
-        lengths = 1.0
-    else:
-        wrench = channels
-        lengths = _moment_unit(content, columns, unit, calibrated=kind in _CALIBRATED)
-    force, moment = wrench[:, :3], wrench[:, 3:6] * lengths
-    if kind == 1:  # centre of pressure and free moment in place of moments
-        point = np.column_stack([wrench[:, 3:5] * unit, np.zeros(len(wrench))])
-        moment = np.cross(point, force) + [0.0, 0.0, 1.0] * moment[:, 2:]
+        raise DataError(f"is of type {kind}", allowed=f"types {', '.join(map(str, _CHANNELS))}")
+    count = _CHANNELS[kind]
+    columns = values["CHANNEL"][:count].astype(int) - 1
+    if columns.size < count or columns.min() < 0 or columns.max() >= analog.shape[1]:
+        raise DataError(f"names channels that are not there, and type {kind} has {count}")
+    channels, lengths = analog[:, columns], unit
+    if kind in _ROWS:
+        matrix = values.get("CAL_MATRIX", np.zeros((0, 0)))[: _ROWS[kind], :count]
+        if matrix.shape != (_ROWS[kind], count):
+            raise DataError(f"has no CAL_MATRIX of {_ROWS[kind]} x {count}")
+        channels = channels @ matrix.T
+    elif columns[-1] < len(units):  # moments have a unit of their own, or the file's
+        own = units[columns[-1]].lower().strip().removeprefix("n").strip(" .*-")
+        lengths = METRES.get(own, unit)
+    corners, origin = values["CORNERS"].T * unit, values["ORIGIN"] * unit
+    if origin[2] > 0.0:  # in files of some programs the sensors seem to lie above the surface
+        origin = -origin
+    sensors = np.abs(origin[:2])  # where types 3, 6 and 7 keep how far they stand from the centre
+    if kind not in (2, 4):
         origin = origin * [0.0, 0.0, 1.0]
-    else:
-        origin = origin * [0.0, 0.0, 1.0] if kind in (3, 5, 7) else origin
-        moment = moment + np.cross(force, origin)
-    corners = values["CORNERS"].T * unit
     axes = plate_axes(corners)
+    if kind == 1:  # centre of pressure and free moment in place of moments
+        force, point = channels[:, :3], channels[:, 3:6] * [unit, unit, 0.0]
+        moment = np.cross(point, force)
+        moment[:, 2] += channels[:, 5] * lengths
+    else:
+        if kind in (3, 6, 7):
+            channels, lengths = _wrench_of_corners(channels, *sensors), 1.0
+        force = channels[:, :3]
+        moment = channels[:, 3:6] * lengths + np.cross(force, origin)
     return ForcePlate(name, corners, force @ axes, moment @ axes, origin @ axes)
 
 
-def _wrench_of_eight(channels: np.ndarray, a: float, b: float) -> np.ndarray:
-    """Return force and moment of a plate with four sensors, shape (samples, 6).
+def _wrench_of_corners(channels: np.ndarray, a: float, b: float) -> np.ndarray:
+    """Return force and moment of a plate with sensors at its corners, shape (samples, 6).
 
     Args:
-        channels: x12, x34, y14, y23, z1, z2, z3, z4 [N], shape (samples, 8).
+        channels: x12, x34, y14, y23, z1, z2, z3, z4, or x, y, z of every corner in turn [N], shape
+            (samples, 8) or (samples, 12).
         a: Distance of the sensors from the centre along the plate's x [m].
         b: The same along y [m].
     """
-    x12, x34, y14, y23, z1, z2, z3, z4 = channels.T
+    if channels.shape[1] == 12:
+        x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4 = channels.T
+        x12, x34, y14, y23 = x1 + x2, x3 + x4, y1 + y4, y2 + y3
+    else:
+        x12, x34, y14, y23, z1, z2, z3, z4 = channels.T
     return np.column_stack([
         x12 + x34, y14 + y23, z1 + z2 + z3 + z4,
         b * (z1 + z2 - z3 - z4), a * (-z1 + z2 + z3 - z4), b * (-x12 + x34) + a * (y14 - y23),
     ])  # fmt: skip
-
-
-def _moment_unit(content: Any, columns: np.ndarray, unit: float, calibrated: bool) -> float:
-    """Return the length in the unit of the moments [m]: their own, else the file's."""
-    group = content["parameters"]["ANALOG"]
-    units = [str(text) for text in continued(group, "UNITS")]
-    if not calibrated and columns[-1] < len(units):
-        own = units[columns[-1]].lower().strip().removeprefix("n").strip(" .*-")
-        return METRES.get(own, unit)
-    return unit
 
 
 def analog_offset_error(offset: np.ndarray, scale: np.ndarray, unsigned: bool) -> np.ndarray:
@@ -200,11 +197,11 @@ def analog_channels(content: Any) -> np.ndarray:
     """Return the analog channels in physical units, shape (samples, channels)."""
     group = content["parameters"]["ANALOG"]
     channels = np.array(content["data"]["analogs"][0].T, dtype=float)
-    used = channels.shape[1]
     offset, scale = (
-        np.asarray(continued(group, name), dtype=float)[:used] for name in ("OFFSET", "SCALE")
+        np.asarray(continued(group, name), dtype=float)[: channels.shape[1]]
+        for name in ("OFFSET", "SCALE")
     )
-    general = float(group["GEN_SCALE"]["value"][0])
+    scale = scale * float(group["GEN_SCALE"]["value"][0])
     form = group["FORMAT"]["value"] if "FORMAT" in group else []
     unsigned = bool(form) and str(form[0]).strip().upper() == "UNSIGNED"
-    return channels - analog_offset_error(offset, scale * general, unsigned)
+    return channels - analog_offset_error(offset, scale, unsigned)

@@ -82,8 +82,8 @@ def inverse_result(config: InverseDynamicsConfig, file: Path) -> tuple[InverseRe
     residuals = {
         f"{table.condition}_{part}_{kind}": float(value)
         for table in residual_tables(trials, patient, config)
-        if table.part == "whole cycle" and (span := table.range) is not None
-        for kind, values in span.items()
+        if table.part == "whole cycle"
+        for kind, values in table.range.items()
         for part, value in zip(COMPONENTS, values / table.body_mass, strict=True)
     }
     rows = strength_table(trials, patient, config).rows

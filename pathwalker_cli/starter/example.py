@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -85,13 +86,11 @@ def made_recordings(patient: Patient, condition: Condition) -> Iterator[Recordin
     child, other = _Body.of(patient, condition), _Body.of(source, condition)
     points = marker_points(load_marker_set(), patient, condition)
     noise = np.random.default_rng(_SEED)
-    number = 0
-    for name in recording_names(source, condition):
-        trial = read_recording(source, condition, name)
-        if number < TRIALS and _measured(trial):
-            number += 1
-            played = _played(trial, child, other)
-            yield _recording(f"made-{condition}-{number}", played, child, other, points, noise)
+    names = recording_names(source, condition)
+    trials = filter(_measured, (read_recording(source, condition, name) for name in names))
+    for number, trial in enumerate(islice(trials, TRIALS), start=1):
+        played = _played(trial, child, other)
+        yield _recording(f"made-{condition}-{number}", played, child, other, points, noise)
 
 
 def _measured(trial: CompactRecording) -> list[Stance]:

@@ -240,11 +240,7 @@ def _environment() -> Environment:
 
 
 def check_new(folder: Path) -> None:
-    """Refuse a folder that holds anything.
-
-    Raises:
-        DataError: If it does, or is a file.
-    """
+    """Refuse a folder that holds anything, and a file."""
     if folder.exists() and not folder.is_dir():
         raise DataError("is a file, not a folder", where=str(folder), mend="choose another name")
     inside = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
