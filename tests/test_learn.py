@@ -15,10 +15,11 @@ from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.config.learnt import Learnt, Prior
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
+from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.results.run_folder import Run, load_run
 from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.studies.base import base_case, load_study, resolver_of
-from pathwalker_cli.studies.learn import LearnStudy
+from pathwalker_cli.studies.learn import LearnStudy, plan
 from pathwalker_cli.studies.learn.fit import Learner, descend
 from pathwalker_cli.studies.learn.targets import Target, residuals, targets_of
 from pathwalker_cli.studies.neighbours import Journal
@@ -284,6 +285,18 @@ def test_a_run_that_does_not_weigh_a_goal_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(cli, [*words, "--out", str(tmp_path / "out")])
     assert result.exit_code == 2, result.output
     assert "does not weigh 'time'" in result.output
+    result = CliRunner().invoke(cli, [*words, "--set", "condition=orthosis"])
+    assert result.exit_code == 2, result.output
+    assert "condition: is orthosis, but the run is barefoot" in result.output
+
+
+def test_the_condition_says_which_walks_are_learnt_from() -> None:
+    study = load_study("learn", LearnStudy, ("condition=orthosis",))
+    case = base_case(study)
+    assert case.config.condition == "orthosis"
+    assert case.config.problem == "mapd-orthosis"
+    assert "orthosis trials" in plan(study, GaitSolver(case)).does
+    assert base_case(load_study("learn", LearnStudy)).config.condition == "barefoot"
 
 
 @pytest.mark.parametrize(

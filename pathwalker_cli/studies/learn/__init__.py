@@ -28,6 +28,7 @@ from pydantic import Field
 from pathwalker_cli.case import Case
 from pathwalker_cli.config.learnt import COST, Learnt, LearntNumber, Prior, config_values
 from pathwalker_cli.config.schema import TrialName
+from pathwalker_cli.conventions import Condition
 from pathwalker_cli.errors import ConfigError, DataError, did_you_mean
 from pathwalker_cli.evaluation.recorded import RecordedGait, recorded_gait
 from pathwalker_cli.gait.resolve import Optimum
@@ -74,6 +75,7 @@ Barrier = Annotated[float, Quantity("", 0.0, 1.0)]
 class LearnStudy(NeighbourStudy):
     """What is learnt, from which recordings."""
 
+    condition: Condition | None = None
     numbers: Annotated[dict[str, Prior], Field(min_length=1)]
     weights: Weights = Weights()
     without: tuple[TrialName, ...] = ()
@@ -84,8 +86,11 @@ class LearnStudy(NeighbourStudy):
     seed: Annotated[int, Field(ge=0)] = 0
 
     def based_on(self, case: Case) -> Case:
-        """Return a case with all numbers at their priors."""
-        return case.with_values(config_values({k: p.prior for k, p in self.numbers.items()}))
+        """Return a case of the condition that is learnt from, with all numbers at their priors."""
+        values = config_values({k: p.prior for k, p in self.numbers.items()})
+        if self.condition not in (None, case.config.condition):
+            values["problem"] = f"mapd-{self.condition}"
+        return case.with_values(values)
 
     def recorded(self, solver: GaitSolver) -> RecordedGait:
         """Return the recordings that are learnt from.
@@ -133,9 +138,15 @@ def plan(study: LearnStudy, solver: GaitSolver) -> Plan:
     """Return what would be learnt, and from what.
 
     Raises:
-        ConfigError: If a number or a trial does not exist.
+        ConfigError: If a number or a trial does not exist, or the run is of the other condition.
         DataError: If there is nothing to learn from.
     """
+    walked = solver.walker.condition
+    if study.condition not in (None, walked):
+        raise ConfigError(
+            f"is {study.condition}, but the run is {walked}", where="condition", allowed=walked,
+            mend="leave --run out, or give a run of that condition",
+        )  # fmt: skip
     known = {a for n in solver.walker.numbers for a in (n.address, n.place)}
     for place in study.numbers:
         if not place.startswith(COST) and place not in known:
@@ -155,7 +166,7 @@ def plan(study: LearnStudy, solver: GaitSolver) -> Plan:
     recorded = study.recorded(solver)
     trials = len({t.name for t in recorded.trials} - set(study.without))
     does = (
-        f"learns {len(study.numbers)} numbers from {trials} {solver.walker.condition} trials, "
+        f"learns {len(study.numbers)} numbers from {trials} {walked} trials, "
         f"{len(study.targets(recorded))} curves and numbers of the walk"
     )
     return Plan(does, study.steps * study.starts * len(study.smoothing))
