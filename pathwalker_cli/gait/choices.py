@@ -84,6 +84,10 @@ EAGER_SHARE: Final = 0.3
 from round to round, and would take the error to another interval that just met it before."""
 COST_AIM: Final = 0.3
 """Share of the cost's tolerance that intervals which are not split may change it by."""
+COST_SURE: Final = 0.5
+COST_SIZE: Final = 2.0
+"""Shares of that tolerance below which the estimated change, which is good to a factor of two, and
+the sum of its sizes over all intervals let a mesh pass: neighbours undo most of each other's."""
 AIM: Final = 2.0
 MOST_PARTS: Final = 4
 """By how much a split interval shall beat the tolerance, as the next solution moves a little, and

@@ -414,6 +414,8 @@ class GaitSolver:
             return tuple(np.zeros(len(mesh) - 1, bool) for mesh in program.meshes)
         allowed = self.config.mesh.cost_tolerance * abs(result.objective)
         size = sum(np.abs(part).sum() for part in error.shares)
+        if abs(error.total) <= choices.COST_SURE * allowed and size <= choices.COST_SIZE * allowed:
+            return tuple(np.zeros(part.shape, bool) for part in error.shares)
         return meshing.costly(error.shares, allowed * (choices.COST_AIM if size > allowed else 1.0))
 
     def _cost_error(self, program: CollocationProgram, result: NlpResult) -> CostError | None:
