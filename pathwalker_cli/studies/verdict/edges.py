@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
+import numpy as np
+
 from pathwalker_cli.gait.resolve import Optimum
 
 _SOLVES: Final = 8
@@ -96,7 +98,8 @@ def find_edge(
         rise = (end.cost - optimum.cost) / size
         if rise <= share * (1.0 + _NEAR):
             search.inside, search.at, search.rise = end, trial, rise
-            step = max(step, 2.0 * abs(trial - start))
+            # where the cost rises by far less than expected, the end of the range is the next guess
+            step = np.inf if rise < share / 2.0 else max(step, 2.0 * abs(trial - start))
         else:
             search.outside, search.outside_rise = trial, rise
         if abs(rise - share) <= _NEAR * share and trial != limit:
