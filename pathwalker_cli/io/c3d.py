@@ -43,12 +43,12 @@ resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 import ezc3d
 try:
     ezc3d.c3d(sys.argv[1])
-except MemoryError:
-    sys.exit(3)
+except Exception as problem:
+    sys.exit(str(problem) or type(problem).__name__)
 """
-"""Reads a file within 4 GB of memory."""
-_TOO_LARGE: Final = 3
-"""How that process ends if they are too few."""
+"""Reads a file within 4 GB of memory, or says why not."""
+_TOO_FEW: Final = ("MemoryError", "bad_alloc", "bad_array_new_length")
+"""How it says that they are too few."""
 
 
 @dataclass(frozen=True)
@@ -166,33 +166,32 @@ def open_c3d(path: Path) -> Any:
             "C3D files need ezc3d", where=str(path), mend="install it: pip install ezc3d"
         ) from None
     _probe(path)
-    try:
-        return ezc3d.c3d(str(path))
-    except (OSError, RuntimeError, ValueError) as problem:
-        reason = str(problem).strip().splitlines()[0] if str(problem).strip() else "unreadable"
-        raise DataError(f"not a C3D file: {reason}", where=str(path)) from None
+    return ezc3d.c3d(str(path))
 
 
 def _probe(path: Path) -> None:
-    """Refuse a file that kills its reader, fills the memory or never ends.
+    """Refuse a file that cannot be read, kills its reader, fills the memory or never ends.
 
     ezc3d is compiled and dies of some damaged files, which no exception tells; so it reads every
     file in a process of its own first.
     """
     words = [sys.executable, "-P", "-c", _PROBE, str(path.resolve())]
-    what = ""
+    what, mend = "", "export the recording again"
     try:
         done = subprocess.run(  # noqa: S603 - this Python, a text of this module, and a path
             words, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=_LONGEST
         )
-        if done.returncode == _TOO_LARGE:
-            what = "is damaged or too large: reading takes more than 4 GB of memory"
-        elif done.returncode < 0:
+        reason = done.stderr.decode(errors="replace").strip().partition("\n")[0]
+        if done.returncode < 0:
             what = "is damaged: its reader dies of it"
+        elif done.returncode and any(word in reason for word in _TOO_FEW):
+            what = "is damaged or too large: reading takes more than 4 GB of memory"
+        elif done.returncode:
+            what, mend = f"not a C3D file: {reason}", ""
     except subprocess.TimeoutExpired:
         what = f"is damaged: reading does not end in {_LONGEST:g} s"
     if what:
-        raise DataError(what, where=str(path), mend="export the recording again")
+        raise DataError(what, where=str(path), mend=mend)
 
 
 def _value(parameters: Any, group: str, name: str, path: Path) -> Any:
