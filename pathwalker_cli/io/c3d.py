@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.errors import DataError
+from pathwalker_cli.errors import DataError, placed
 from pathwalker_cli.io.c3d_events import Event, continued, read_events
 from pathwalker_cli.io.c3d_plates import METRES, ForcePlate, read_plates
 
@@ -113,22 +113,28 @@ def read_c3d(path: str | Path, subject: str | None = None) -> Recording:
     """
     path = Path(path)
     content = open_c3d(path)
+    with placed(str(path)):
+        return _recording(content, path, subject)
+
+
+def _recording(content: Any, path: Path, subject: str | None) -> Recording:
+    """Return what ezc3d's view of a file holds."""
     parameters = content["parameters"]
-    rate = float(_value(parameters, "POINT", "RATE", path)[0])
+    rate = float(_value(parameters, "POINT", "RATE")[0])
     first_frame = int(content["header"]["points"]["first_frame"]) + 1
     points = content["data"]["points"]
-    _value(parameters, "POINT", "LABELS", path)
+    _value(parameters, "POINT", "LABELS")
     # labels beyond the last point name nothing
     labels = [str(label) for label in continued(parameters["POINT"], "LABELS")][: points.shape[1]]
     parts = [label.rpartition(":") for label in labels]
     subjects = tuple(dict.fromkeys(part[0].strip() for part in parts if part[1]))
     if subject is not None and subject not in subjects:
-        what, allowed = f"names no subject {subject}", ", ".join(subjects) or "none is named"
-        raise DataError(what, where=str(path), allowed=allowed)
+        allowed = ", ".join(subjects) or "none is named"
+        raise DataError(f"names no subject {subject}", allowed=allowed)
     every = [i for i, part in enumerate(parts) if subject in (None, part[0].strip())]
     kinds = {i: kind[1] for i in every if (kind := _MODELLED.search(parts[i][2].strip()))}
     own = [i for i in every if i not in kinds]
-    unit = _unit(parameters, path)
+    unit = _unit(parameters)
     samples = content["data"]["analogs"].shape[2]
     plates, remarks = read_plates(content, unit)
     return Recording(
@@ -194,21 +200,19 @@ def _probe(path: Path) -> None:
         raise DataError(what, where=str(path), mend=mend)
 
 
-def _value(parameters: Any, group: str, name: str, path: Path) -> Any:
+def _value(parameters: Any, group: str, name: str) -> Any:
     """Return a parameter's value."""
     try:
         return parameters[group][name]["value"]
     except KeyError:
-        raise DataError(f"has no parameter {group}:{name}", where=str(path)) from None
+        raise DataError(f"has no parameter {group}:{name}") from None
 
 
-def _unit(parameters: Any, path: Path) -> float:
+def _unit(parameters: Any) -> float:
     """Return the length of the file's unit [m]."""
-    unit = str(_value(parameters, "POINT", "UNITS", path)[0]).strip().lower()
+    unit = str(_value(parameters, "POINT", "UNITS")[0]).strip().lower()
     if unit not in METRES:
-        raise DataError(
-            f"marker positions are in '{unit}'", where=str(path), allowed=", ".join(METRES)
-        )
+        raise DataError(f"marker positions are in '{unit}'", allowed=", ".join(METRES))
     return METRES[unit]
 
 
