@@ -187,7 +187,7 @@ def _probe(path: Path) -> None:
         done = subprocess.run(  # noqa: S603 - this Python, a text of this module, and a path
             words, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=_LONGEST
         )
-        reason = done.stderr.decode(errors="replace").strip().partition("\n")[0]
+        reason = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
         if done.returncode < 0:
             what = "is damaged: its reader dies of it"
         elif done.returncode and any(word in reason for word in _TOO_FEW):
