@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from made_c3d import write_c3d
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.io.c3d import read_c3d
 from pathwalker_cli.io.c3d_plates import analog_offset_error
@@ -70,6 +71,16 @@ def test_files_that_are_not_c3d_are_refused(tmp_path: Path) -> None:
         read_c3d(path)
     with pytest.raises(DataError, match="no such recording"):
         read_c3d(tmp_path / "none.c3d")
+
+
+def test_a_damaged_file_does_not_fill_the_memory(tmp_path: Path) -> None:
+    """With this byte, the library alone takes 13 GB and a minute before it gives up."""
+    path = write_c3d(tmp_path / "walk.c3d", plate=True)
+    data = bytearray(path.read_bytes())
+    data[data.index(b"ORIGIN") - 3] = 128  # length of the description before
+    path.write_bytes(data)
+    with pytest.raises(DataError, match="reading takes more than 4 GB of memory"):
+        read_c3d(path)
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,13 @@ from pathwalker_cli.evaluation.differences import (
     rms_mean_cycle,
     rms_one_trial,
 )
-from pathwalker_cli.evaluation.evaluate import Evaluation, compared, evaluate_gait, gait_changes
+from pathwalker_cli.evaluation.evaluate import (
+    Evaluation,
+    Row,
+    compared,
+    evaluate_gait,
+    gait_changes,
+)
 from pathwalker_cli.evaluation.norms import PROFILE
 from pathwalker_cli.evaluation.paper import paper_number
 from pathwalker_cli.evaluation.recorded import (
@@ -338,6 +344,11 @@ def test_other_recordings_have_no_stride_of_the_article() -> None:
 # The whole evaluation
 
 
+def rows_of(evaluation: Evaluation) -> dict[str, Row]:
+    """Return the rows by the keys of their measures."""
+    return {row.measure.key: row for row in evaluation.rows}
+
+
 @pytest.mark.parametrize("condition", ["barefoot", "orthosis"])
 def test_every_quantity_has_a_row(condition: Condition) -> None:
     evaluation = made_evaluation(condition)
@@ -349,20 +360,19 @@ def test_every_quantity_has_a_row(condition: Condition) -> None:
         assert np.isfinite(row.value)
     for key in (*FORCE_RMS, "step_length_left", "rms_mean_cycle_knee", "rms_one_trial_hip",
                 "peak_vertical_force_right", "ankle_torque_slope_stance_left"):  # fmt: skip
-        assert evaluation.row(key).position in ("below", "in", "above")
+        assert rows_of(evaluation)[key].position in ("below", "in", "above")
     assert not [note for note in evaluation.notes if "typical children" not in note]
-    with pytest.raises(KeyError):
-        evaluation.row("colour")
+    assert evaluation.find("colour") is None
 
 
 def test_the_article_stands_beside_its_own_patient_and_problem() -> None:
     evaluation = made_evaluation("orthosis")
-    speed = evaluation.row("walking_speed")
+    speed = rows_of(evaluation)["walking_speed"]
     assert (str(speed.paper), str(speed.paper_recorded)) == ("0.62", "0.70-0.98")
     other = evaluate_gait(replace(made_gait(), problem="mapd-ws-orthosis"),
                           recorded=recordings("orthosis"))  # fmt: skip
-    assert str(other.row("walking_speed").paper) == "0.77"
-    assert other.row("rms_one_trial_hip").paper is None
+    assert str(rows_of(other)["walking_speed"].paper) == "0.77"
+    assert rows_of(other)["rms_one_trial_hip"].paper is None
 
 
 def test_changes_are_differences_of_values_and_of_recorded_means() -> None:
@@ -383,7 +393,7 @@ def test_without_recordings_the_rest_is_still_there() -> None:
     gait = replace(made_gait(), walker=build_walker(load_patient(CHILD), "orthosis"))
     evaluation = evaluate_gait(gait)
     assert evaluation.recorded is None
-    assert evaluation.row("walking_speed").value == gait.walking_speed
+    assert rows_of(evaluation)["walking_speed"].value == gait.walking_speed
     assert all(row.recorded is None and row.paper is None for row in evaluation.rows)
     assert len(evaluation.notes) == 1
     assert "has no orthosis recordings" in evaluation.notes[0]
@@ -393,8 +403,8 @@ def test_recordings_without_forces_still_tell_of_angles() -> None:
     found = recordings("barefoot")
     blind = tuple(replace(t, forces=None, tau=None, stances=()) for t in found.trials)
     evaluation = evaluate_gait(made_gait("barefoot"), recorded=replace(found, trials=blind))
-    assert evaluation.row("rms_mean_cycle_knee").recorded is not None
-    assert evaluation.row("peak_vertical_force_right").recorded is None
+    assert rows_of(evaluation)["rms_mean_cycle_knee"].recorded is not None
+    assert rows_of(evaluation)["peak_vertical_force_right"].recorded is None
     assert all(row.value is None for row in evaluation.rows if row.measure.key in FORCE_RMS)
     assert len(evaluation.notes) == 3
     assert all("not compared" in note for note in evaluation.notes[1:])

@@ -225,7 +225,7 @@ def test_numbers_of_the_page_are_those_of_the_runs(runs: Path) -> None:
     assert rows["stance share"][2] == ", ".join(f"{100 * share:.1f}" for share in shares)
     assert rows["double support share"][2] == f"{100 * (sum(shares) - 1):.1f}"
     assert rows["cadence"][2::3] == tuple(f"{each['cadence']:.1f}" for each in metrics)
-    peaks = [found[1].evaluation.row(f"peak_vertical_force_{side}") for side in ("right", "left")]
+    peaks = [found[1].evaluation.find(f"peak_vertical_force_{side}") for side in ("right", "left")]
     assert rows["peak vertical force"][5] == ", ".join(p.measure.text(p.value) for p in peaks)
     assert rows["peak vertical force"][7] == ", ".join(p.position or "" for p in peaks)
     changes = section(page, "What changes").tables[0]

@@ -117,14 +117,6 @@ class Evaluation:
     notes: tuple[str, ...]
     unusual: tuple[str, ...] = ()
 
-    def row(self, key: str) -> Row:
-        """Return the row of a measure.
-
-        Raises:
-            KeyError: If it was left out.
-        """
-        return {row.measure.key: row for row in self.rows}[key]
-
     def find(self, key: str) -> Row | None:
         """Return the row of a measure, None if it was left out."""
         return next((row for row in self.rows if row.measure.key == key), None)

@@ -35,8 +35,12 @@ def cycle_figure(trace: Trace, curves: Sequence[CycleCurve]) -> Figure:
 
     A dot marks the least knee flexion of stance.
     """
-    dot = "least knee flexion" if any(curve.least_in_stance for curve in curves) else ""
-    handles = legend_handles([trace], dot)
+    handles = _trace_handles([trace])
+    if any(curve.least_in_stance for curve in curves):
+        handles.append(_dot("least knee flexion"))
+    handles.append(style.events_handle())
+    if trace.recorded is not None:
+        handles.append(Patch(facecolor="#cccccc", label="recorded: range, mean"))
     fig = cycle_pairs(curves, [trace], _head(len(handles)))
     style.legend(fig, handles)
     return fig
@@ -125,22 +129,6 @@ def _saved(makers: Mapping[str, Callable[[], Figure]], folder: str | Path) -> tu
             figure = make()
         saved += save_formats(figure, folder, name)
     return tuple(saved)
-
-
-def legend_handles(shown: Sequence[Trace], dot: str = "") -> list[Artist]:
-    """Return the entries of a legend: gaits, a dot if there is one, toe-offs, recorded range."""
-    handles: list[Artist] = _trace_handles(shown)
-    if dot:
-        handles.append(_dot(dot))
-    handles.append(style.events_handle())
-    if len(shown) == 1 and shown[0].recorded is not None:
-        handles.append(Patch(facecolor="#cccccc", label="recorded: range, mean"))
-    handles += [
-        Patch(facecolor=trace.band["color"], alpha=0.3, label=f"recorded range, {trace.label}")
-        for trace in shown
-        if trace.order is not None and trace.recorded is not None
-    ]
-    return handles
 
 
 def _head(entries: int) -> float:

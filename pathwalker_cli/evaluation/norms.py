@@ -89,15 +89,15 @@ def sides_shown(stride: Stride) -> tuple[Side, ...]:
     return SIDES if stride.side is None else (stride.side,)
 
 
-def within_norms(stride: Stride, deviations: float = 2.0) -> dict[str, float]:
-    """Return the share of the gait cycle within so many standard deviations of typical children.
+def within_norms(stride: Stride) -> dict[str, float]:
+    """Return the share of the gait cycle within two standard deviations of typical children.
 
     At the speed of the stride, right and left pooled, by key of the curve; [1].
     """
     inside: dict[str, list[float]] = {}
     for side in sides_shown(stride):
         for key, (line, norm) in _off(stride, side).items():
-            share = float(np.mean(np.abs(line) < deviations * norm.sd))
+            share = float(np.mean(np.abs(line) < 2.0 * norm.sd))
             inside.setdefault(key, []).append(share)
     return {key: float(np.mean(shares)) for key, shares in inside.items()}
 

@@ -133,11 +133,12 @@ def _told(
         return value
     for name, number in recording.numbers.items():
         if name.lower().replace(" ", "").replace("_", "") in names and number > 0.0:
-            sources.append(f"{what}: PROCESSING:{name} of {recording.name}")
-            if what != "height":
+            if what == "height":  # in m, cm or mm
+                heights = (round(scale * number, 3) for scale in (1.0, 0.01, 0.001))
+                number = next((h for h in heights if _HEIGHTS[0] <= h <= _HEIGHTS[1]), 0.0)
+            if number:
+                sources.append(f"{what}: PROCESSING:{name} of {recording.name}")
                 return number
-            scales = (s for s in (1.0, 0.01, 0.001) if _HEIGHTS[0] <= s * number <= _HEIGHTS[1])
-            return next((round(s * number, 3) for s in scales), None)
     return None
 
 

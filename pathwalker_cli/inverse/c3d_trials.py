@@ -121,6 +121,10 @@ def c3d_trials(
             pose = pose if feet_move(file.recording, file.points) else file
     if still and len(still) == len(files):
         raise still[0]
+    if still and passes:
+        aside = (f"{error.where} is set aside: its {error.what}" for error in still)
+        walk, file = passes[0]
+        passes[0] = replace(walk, remarks=(*walk.remarks, *aside)), file
     feet = _feet_of_pose(pose, patient) if pose else {}
     trials = []
     for walk, file in passes:
@@ -128,16 +132,7 @@ def c3d_trials(
         same = pose and file.known and pose.known and file.known.name == pose.known.name
         trial = _walk_trial(walk, file, patient, condition, config, feet if same else {})
         trials.append((trial, file.recording))
-    if still and trials:
-        aside = tuple(f"{error.where} is set aside: its {error.what}" for error in still)
-        trials[0] = _noted(trials[0][0], aside), trials[0][1]
     return trials
-
-
-def _noted(trial: Trial, remarks: tuple[str, ...]) -> Trial:
-    """Return a trial with further remarks on how it was read."""
-    walk = trial.walk and replace(trial.walk, remarks=(*trial.remarks, *remarks))
-    return replace(trial, walk=walk)
 
 
 def _feet_of_pose(pose: MarkedFile, patient: Patient) -> FootPlaces:

@@ -131,7 +131,7 @@ def ground_forces(
     return GroundForces(table, judged, remarks, tuple(loads))
 
 
-def plate_loads(recording: Recording, cutoff: float = FORCE_CUTOFF) -> list[ForcePlate]:
+def plate_loads(recording: Recording) -> list[ForcePlate]:
     """Return the plates with their loads at the marker frames, unloaded level removed, filtered."""
     per_frame, frames = recording.samples_per_frame, recording.positions.shape[0]
     loads = []
@@ -140,7 +140,7 @@ def plate_loads(recording: Recording, cutoff: float = FORCE_CUTOFF) -> list[Forc
         idle = np.abs(plate.force[:, 2]) < LOADED
         if idle.any():
             wrench = wrench - np.median(wrench[idle], axis=0)
-        smooth = low_pass(wrench, recording.rate * per_frame, cutoff)[::per_frame][:frames]
+        smooth = low_pass(wrench, recording.rate * per_frame, FORCE_CUTOFF)[::per_frame][:frames]
         loads.append(replace(plate, force=smooth[:, :3], moment=smooth[:, 3:]))
     return loads
 

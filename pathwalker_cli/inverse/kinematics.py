@@ -49,11 +49,8 @@ class MarkerResiduals:
 
     def rms(self) -> dict[str, float]:
         """Return the root mean square distance of each point [m], NaN if it was never seen."""
-        seen = np.isfinite(self.distances)
-        squares = np.where(seen, self.distances, 0.0) ** 2
-        with np.errstate(invalid="ignore"):
-            values = np.sqrt(squares.sum(axis=0) / seen.sum(axis=0))
-        return dict(zip(self.names, values.tolist(), strict=True))
+        mean = np.ma.masked_invalid(self.distances**2).mean(axis=0)
+        return dict(zip(self.names, np.sqrt(np.ma.filled(mean, np.nan)).tolist(), strict=True))
 
 
 def inverse_kinematics(

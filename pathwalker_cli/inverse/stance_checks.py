@@ -171,5 +171,4 @@ def outside(points: np.ndarray, extents: np.ndarray) -> np.ndarray:
         points: Forward positions [m], shape (n,).
         extents: Forward positions of heel and toe [m], shape (n, 2).
     """
-    ends = np.sort(extents, axis=1)
-    return np.maximum(0.0, np.maximum(ends[:, 0] - points, points - ends[:, 1]))
+    return np.asarray(np.abs(points - np.clip(points, *np.sort(extents, axis=1).T)))

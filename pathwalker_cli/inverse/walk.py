@@ -229,15 +229,12 @@ def _pelvis_path(recording: Recording, points: tuple[MarkerPoint, ...]) -> np.nd
     names = dict.fromkeys(_on(points, "pelvis"))
     markers = np.stack([recording.marker(name)[:, :2] for name in names])
     steps = np.diff(markers, axis=1)
-    known = np.linalg.norm(steps, axis=2, keepdims=True) < _FASTEST / recording.rate
-    known = np.repeat(known, 2, axis=2)
-    count = known.sum(axis=0)
-    mean = np.where(known, steps, 0.0).sum(axis=0) / np.maximum(count, 1)
-    gaps = count[:, 0] == 0
-    if gaps.any() and not gaps.all():  # through gaps of all markers it goes straight on
-        rows = np.arange(len(mean))
-        for axis in range(2):
-            mean[gaps, axis] = np.interp(rows[gaps], rows[~gaps], mean[~gaps, axis])
+    known = np.linalg.norm(steps, axis=2) < _FASTEST / recording.rate
+    steps[~known] = 0.0
+    mean = steps.sum(axis=0) / np.maximum(known.sum(axis=0), 1)[:, None]
+    rows, seen = np.arange(len(mean)), known.any(axis=0)
+    if seen.any():  # through gaps of all markers it goes straight on
+        mean = np.stack([np.interp(rows, rows[seen], column[seen]) for column in mean.T], axis=1)
     return np.concatenate([np.zeros((1, 2)), np.cumsum(mean, axis=0)])
 
 

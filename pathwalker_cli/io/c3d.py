@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.errors import DataError
+from pathwalker_cli.errors import DataError, placed
 from pathwalker_cli.io.c3d_events import Event, continued, read_events
 from pathwalker_cli.io.c3d_plates import METRES, ForcePlate, read_plates
 
@@ -43,12 +43,12 @@ resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 import ezc3d
 try:
     ezc3d.c3d(sys.argv[1])
-except MemoryError:
-    sys.exit(3)
+except Exception as problem:
+    sys.exit(str(problem) or type(problem).__name__)
 """
-"""Reads a file within 4 GB of memory."""
-_TOO_LARGE: Final = 3
-"""How that process ends if they are too few."""
+"""Reads a file within 4 GB of memory, or says why not."""
+_TOO_FEW: Final = ("MemoryError", "bad_alloc", "bad_array_new_length")
+"""How it says that they are too few."""
 
 
 @dataclass(frozen=True)
@@ -113,22 +113,28 @@ def read_c3d(path: str | Path, subject: str | None = None) -> Recording:
     """
     path = Path(path)
     content = open_c3d(path)
+    with placed(str(path)):
+        return _recording(content, path, subject)
+
+
+def _recording(content: Any, path: Path, subject: str | None) -> Recording:
+    """Return what ezc3d's view of a file holds."""
     parameters = content["parameters"]
-    rate = float(_value(parameters, "POINT", "RATE", path)[0])
+    rate = float(_value(parameters, "POINT", "RATE")[0])
     first_frame = int(content["header"]["points"]["first_frame"]) + 1
     points = content["data"]["points"]
-    _value(parameters, "POINT", "LABELS", path)
+    _value(parameters, "POINT", "LABELS")
     # labels beyond the last point name nothing
     labels = [str(label) for label in continued(parameters["POINT"], "LABELS")][: points.shape[1]]
     parts = [label.rpartition(":") for label in labels]
     subjects = tuple(dict.fromkeys(part[0].strip() for part in parts if part[1]))
     if subject is not None and subject not in subjects:
-        what, allowed = f"names no subject {subject}", ", ".join(subjects) or "none is named"
-        raise DataError(what, where=str(path), allowed=allowed)
+        allowed = ", ".join(subjects) or "none is named"
+        raise DataError(f"names no subject {subject}", allowed=allowed)
     every = [i for i, part in enumerate(parts) if subject in (None, part[0].strip())]
     kinds = {i: kind[1] for i in every if (kind := _MODELLED.search(parts[i][2].strip()))}
     own = [i for i in every if i not in kinds]
-    unit = _unit(parameters, path)
+    unit = _unit(parameters)
     samples = content["data"]["analogs"].shape[2]
     plates, remarks = read_plates(content, unit)
     return Recording(
@@ -166,50 +172,47 @@ def open_c3d(path: Path) -> Any:
             "C3D files need ezc3d", where=str(path), mend="install it: pip install ezc3d"
         ) from None
     _probe(path)
-    try:
-        return ezc3d.c3d(str(path))
-    except (OSError, RuntimeError, ValueError) as problem:
-        reason = str(problem).strip().splitlines()[0] if str(problem).strip() else "unreadable"
-        raise DataError(f"not a C3D file: {reason}", where=str(path)) from None
+    return ezc3d.c3d(str(path))
 
 
 def _probe(path: Path) -> None:
-    """Refuse a file that kills its reader, fills the memory or never ends.
+    """Refuse a file that cannot be read, kills its reader, fills the memory or never ends.
 
     ezc3d is compiled and dies of some damaged files, which no exception tells; so it reads every
     file in a process of its own first.
     """
     words = [sys.executable, "-P", "-c", _PROBE, str(path.resolve())]
-    what = ""
+    what, mend = "", "export the recording again"
     try:
         done = subprocess.run(  # noqa: S603 - this Python, a text of this module, and a path
             words, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=_LONGEST
         )
-        if done.returncode == _TOO_LARGE:
-            what = "is damaged or too large: reading takes more than 4 GB of memory"
-        elif done.returncode < 0:
+        reason = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+        if done.returncode < 0:
             what = "is damaged: its reader dies of it"
+        elif done.returncode and any(word in reason for word in _TOO_FEW):
+            what = "is damaged or too large: reading takes more than 4 GB of memory"
+        elif done.returncode:
+            what, mend = f"not a C3D file: {reason}", ""
     except subprocess.TimeoutExpired:
         what = f"is damaged: reading does not end in {_LONGEST:g} s"
     if what:
-        raise DataError(what, where=str(path), mend="export the recording again")
+        raise DataError(what, where=str(path), mend=mend)
 
 
-def _value(parameters: Any, group: str, name: str, path: Path) -> Any:
+def _value(parameters: Any, group: str, name: str) -> Any:
     """Return a parameter's value."""
     try:
         return parameters[group][name]["value"]
     except KeyError:
-        raise DataError(f"has no parameter {group}:{name}", where=str(path)) from None
+        raise DataError(f"has no parameter {group}:{name}") from None
 
 
-def _unit(parameters: Any, path: Path) -> float:
+def _unit(parameters: Any) -> float:
     """Return the length of the file's unit [m]."""
-    unit = str(_value(parameters, "POINT", "UNITS", path)[0]).strip().lower()
+    unit = str(_value(parameters, "POINT", "UNITS")[0]).strip().lower()
     if unit not in METRES:
-        raise DataError(
-            f"marker positions are in '{unit}'", where=str(path), allowed=", ".join(METRES)
-        )
+        raise DataError(f"marker positions are in '{unit}'", allowed=", ".join(METRES))
     return METRES[unit]
 
 

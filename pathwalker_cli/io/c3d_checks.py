@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.errors import DataError
+from pathwalker_cli.errors import DataError, placed
 from pathwalker_cli.io.c3d import LEAST_FRAMES, Recording, read_c3d
 
 LEAST_RATE: Final = 50.0
@@ -19,6 +19,9 @@ LEAST_RATE: Final = 50.0
 SPAN: Final = (0.25, 4.0)
 """Height of the markers over the floor's lowest one as a share of the body's height: a person is
 inside, whatever the posture; a wrong unit is off by 10 or 1000."""
+
+_MOST_NAMES: Final = 40
+"""Markers of a file that a message names."""
 
 _BLOCK: Final = 512
 _INTEL: Final = 84
@@ -59,14 +62,13 @@ def readable_recording(path: Path, subject: str | None = None) -> Recording:
     Raises:
         DataError: If the file is damaged, or lacks frames.
     """
-    try:
-        recording = read_c3d(path, subject)
-    except (ValueError, LookupError, ArithmeticError, TypeError, MemoryError) as problem:
-        raise DataError(
-            f"is damaged: {problem}", where=str(path), mend="export the recording again"
-        ) from None
-    _check_length(path)
-    _check_frames(recording, path)
+    with placed(str(path)):
+        try:
+            recording = read_c3d(path, subject)
+        except (ValueError, LookupError, ArithmeticError, TypeError, MemoryError) as problem:
+            raise DataError(f"is damaged: {problem}", mend="export the recording again") from None
+        _check_length(path)
+        _check_frames(recording)
     return recording
 
 
@@ -76,9 +78,10 @@ def check_markers(recording: Recording, names: Sequence[str], height: float, pat
     The height is that of the patient [m].
     """
     names = tuple(dict.fromkeys(names))
-    _check_markers(recording, names, path)
-    _check_unit(recording, names, height, path)
-    _check_signals(recording, path)
+    with placed(str(path)):
+        _check_markers(recording, names)
+        _check_unit(recording, names, height)
+        _check_signals(recording)
 
 
 def require_plates(recording: Recording) -> None:
@@ -108,66 +111,55 @@ def _check_length(path: Path) -> None:
     if last != _ENDLESS and present < frames:
         raise DataError(
             f"is cut off: {max(present, 0)} of its {frames} frames are there",
-            where=str(path),
             mend="copy or export the recording again",
         )
 
 
-def _check_frames(recording: Recording, path: Path) -> None:
+def _check_frames(recording: Recording) -> None:
     """Refuse a recording that is no motion."""
     frames = recording.positions.shape[0]
     if not (np.isfinite(recording.rate) and recording.rate >= LEAST_RATE):
         raise DataError(
             f"has {recording.rate:g} frames per second",
-            where=str(path),
             allowed=f"at least {LEAST_RATE:g}",
             mend="if it was recorded faster, correct POINT:RATE",
         )
     if frames < LEAST_FRAMES:
         raise DataError(
             f"has {frames} frame{'s' if frames != 1 else ''}",
-            where=str(path),
             allowed=f"at least {LEAST_FRAMES}",
             mend="use the recording of a walk, not of a pose",
         )
 
 
-def _check_markers(recording: Recording, markers: Sequence[str], path: Path) -> None:
+def _check_markers(recording: Recording, markers: Sequence[str]) -> None:
     """Refuse a recording in which a marker is missing or was never seen."""
-    mend = "correct the names in the file or give another marker set"
     if not recording.markers or recording.positions.size == 0:
-        raise DataError("has no markers", where=str(path), allowed=", ".join(markers))
+        raise DataError("has no markers", allowed=", ".join(markers))
     missing = [name for name in markers if name not in recording.markers]
     if missing:
         raise DataError(
             f"has no marker {', '.join(missing)}",
-            where=str(path),
             allowed=_some(recording.markers),
-            mend=mend,
+            mend="correct the names in the file or give another marker set",
         )
     twice = [name for name in markers if recording.markers.count(name) > 1]
     if twice:
-        several = len(recording.subjects) > 1
-        raise DataError(
-            f"has {recording.markers.count(twice[0])} markers {', '.join(twice)}",
-            where=str(path),
-            allowed=f"one subject of {', '.join(recording.subjects)}"
-            if several
-            else "one of a name",
-            mend="name the subject (--subject)"
-            if several
-            else "take the wrong one out of the file",
-        )
+        allowed, mend = "one of a name", "take the wrong one out of the file"
+        if len(recording.subjects) > 1:
+            allowed = f"one subject of {', '.join(recording.subjects)}"
+            mend = "name the subject (--subject)"
+        what = f"has {recording.markers.count(twice[0])} markers {', '.join(twice)}"
+        raise DataError(what, allowed=allowed, mend=mend)
     unseen = [n for n in markers if not np.isfinite(recording.marker(n)).any()]
     if unseen:
         raise DataError(
             f"never shows marker {', '.join(unseen)}",
-            where=str(path),
             mend="label it in some frames, or take it out of the marker set",
         )
 
 
-def _check_unit(recording: Recording, markers: Sequence[str], height: float, path: Path) -> None:
+def _check_unit(recording: Recording, markers: Sequence[str], height: float) -> None:
     """Refuse a recording whose lengths cannot be in the unit that it names."""
     every = np.stack([recording.marker(name) for name in markers], axis=1)
     seen = every[np.isfinite(every[..., 0]).any(axis=1)]
@@ -176,21 +168,19 @@ def _check_unit(recording: Recording, markers: Sequence[str], height: float, pat
     if not SPAN[0] * height < span < SPAN[1] * height:
         raise DataError(
             f"its markers span {span:.4g} m from end to end",
-            where=str(path),
             allowed=f"{SPAN[0] * height:.2g} to {SPAN[1] * height:.2g} m at a body height of "
             f"{height:g} m",
             mend="POINT:UNITS must name the unit of the positions: mm and m confused?",
         )
 
 
-def _check_signals(recording: Recording, path: Path) -> None:
+def _check_signals(recording: Recording) -> None:
     """Refuse a recording whose force plates have no extent or hold something else than numbers."""
     for plate in recording.plates:
         sides = np.diff(plate.corners, axis=0)[:2]
         if not np.linalg.norm(np.cross(*sides)) > 0.0:
             raise DataError(
                 f"{plate.name} has no extent",
-                where=str(path),
                 allowed="four corners",
                 mend="set FORCE_PLATFORM:CORNERS and export again",
             )
@@ -198,13 +188,12 @@ def _check_signals(recording: Recording, path: Path) -> None:
         if bad.size:
             raise DataError(
                 f"{plate.name} holds NaN or infinity in {bad.size} samples, first in {bad[0]}",
-                where=str(path),
                 allowed="finite forces",
                 mend="export the analog channels again",
             )
 
 
-def _some(names: Sequence[str], most: int = 40) -> str:
+def _some(names: Sequence[str]) -> str:
     """Return names in a row, the first ones if there are many."""
-    shown = ", ".join(names[:most])
-    return f"{shown} and {len(names) - most} more" if len(names) > most else shown
+    more = len(names) - _MOST_NAMES
+    return ", ".join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")

@@ -179,7 +179,7 @@ def on_sides(
     result = dict(content)
     for name, field in model.model_fields.items():
         value = content.get(name)
-        for inner in _models_in(field):
+        for inner in models_in(field.annotation):
             if issubclass(inner, Worn) and value is not None:
                 result[name] = _of_sides(value, sides, above + name)
             elif isinstance(value, Mapping):
@@ -284,21 +284,23 @@ def field_at(model: type[BaseModel], place: str) -> FieldInfo:
     field = model.model_fields[name]
     if not rest:
         return field
-    inner = _models_in(field)[0]
+    inner = models_in(field.annotation)[0]
     if issubclass(inner, Sides):
         inner = side_type(inner)
     return field_at(inner, rest)
 
 
-def _models_in(field: FieldInfo) -> list[Any]:
-    """Return the model of a field, which may be left out; none where it is no block."""
-    return [part for part in (field.annotation, *get_args(field.annotation)) if is_model(part)]
+def models_in(annotation: Any) -> list[Any]:
+    """Return the models in an annotation such as `dict[str, X] | None`, if it is a block."""
+    if is_model(annotation):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in models_in(part)]
 
 
 def quantity_at(model: type[BaseModel], place: str) -> Quantity:
     """Return unit and range of the number at a dotted place below a model."""
     field = field_at(model, place)
     metadata = list(field.metadata)
-    for inside in _models_in(field):
+    for inside in models_in(field.annotation):
         metadata += get_args(side_type(inside))[1:]
     return next(entry for entry in metadata if isinstance(entry, Quantity))

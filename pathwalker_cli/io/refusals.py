@@ -8,6 +8,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from pathwalker_cli.errors import InputError, did_you_mean
+from pathwalker_cli.io.fields import models_in
 
 KeyPath = tuple[str | int, ...]
 Lines = Mapping[KeyPath, int | str]
@@ -149,12 +150,5 @@ def allowed_keys(model_class: type[BaseModel], location: tuple[str | int, ...]) 
     for part in location:
         field = model.model_fields.get(str(part)) if model else None
         if field is not None:
-            model = _model_in(field.annotation)
+            model = next(iter(models_in(field.annotation)), None)
     return list(model.model_fields) if model else []
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
-    """Return the first pydantic model inside an annotation such as `dict[str, X] | None`."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next(filter(None, map(_model_in, getattr(annotation, "__args__", ()))), None)

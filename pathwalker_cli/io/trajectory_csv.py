@@ -40,10 +40,7 @@ def read_trajectory(path: str | Path, missing: bool = False) -> Trajectory:
             raise DataError(
                 f"has {len(row)} cells", where=f"{path}, row {index + 2}", allowed=f"{len(names)}"
             )
-        try:
-            values[index] = [float(cell) for cell in row]
-        except ValueError:
-            values[index] = [_number(cell) for cell in row]
+        values[index] = [_number(cell) for cell in row]
     for index, column in np.argwhere(~np.isfinite(values)):
         cell = rows[index + 1][column].strip()
         if cell or column == 0 or not missing:

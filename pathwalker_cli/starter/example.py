@@ -52,24 +52,6 @@ _PLATE: Final = (0.5, 0.16)
 """Length and width of a force plate [m]; narrow, so that each carries one foot only."""
 
 
-@dataclass(frozen=True)
-class _Body:
-    """A child in a condition: the model and the length of the legs [m]."""
-
-    model: pin.Model
-    leg: float
-
-    @classmethod
-    def of(cls, patient: Patient, condition: Condition) -> _Body:
-        legs = [patient.length(name, side) for name in ("thigh", "shank") for side in SIDES]
-        return cls(pinocchio_model(patient, condition), sum(legs) / 2.0)
-
-    @property
-    def mass(self) -> float:
-        """Mass with all that is worn [kg]."""
-        return float(pin.computeTotalMass(self.model))
-
-
 def write_example(folder: Path, patient: Patient, conditions: tuple[Condition, ...]) -> None:
     """Write C3D files of a made-up child into c3d/barefoot and c3d/orthosis of a folder."""
     for condition in conditions:
@@ -83,14 +65,19 @@ def write_example(folder: Path, patient: Patient, conditions: tuple[Condition, .
 def made_recordings(patient: Patient, condition: Condition) -> Iterator[Recording]:
     """Yield recordings of a patient who walks as another child was recorded."""
     source = load_patient(SOURCE)
-    child, other = _Body.of(patient, condition), _Body.of(source, condition)
+    models = pinocchio_model(patient, condition), pinocchio_model(source, condition)
+    size = _leg(patient) / _leg(source)
     points = marker_points(load_marker_set(), patient, condition)
     noise = np.random.default_rng(_SEED)
     names = recording_names(source, condition)
     trials = filter(_measured, (read_recording(source, condition, name) for name in names))
     for number, trial in enumerate(islice(trials, TRIALS), start=1):
-        played = _played(trial, child, other)
-        yield _recording(f"made-{condition}-{number}", played, child, other, points, noise)
+        yield _recording(f"made-{condition}-{number}", _played(trial, size, *models), points, noise)
+
+
+def _leg(patient: Patient) -> float:
+    """Return the mean length of the legs, hip to ankle [m]."""
+    return sum(patient.length(name, side) for name in ("thigh", "shank") for side in SIDES) / 2.0
 
 
 def _measured(trial: CompactRecording) -> list[Stance]:
@@ -108,6 +95,8 @@ class _Played:
         frames: Frame of the trial, with fractions, that each frame shows, shape (n,).
         q: Poses of the child [m, rad], shape (n, 10).
         events: Foot strikes and toe-offs in its frames.
+        model: The child.
+        other: The child who was recorded.
     """
 
     trial: CompactRecording
@@ -115,36 +104,35 @@ class _Played:
     frames: np.ndarray
     q: np.ndarray
     events: tuple[Event, ...]
+    model: pin.Model
+    other: pin.Model
 
 
-def _played(trial: CompactRecording, child: _Body, other: _Body) -> _Played:
-    """Return a trial as the child walks it."""
-    size = child.leg / other.leg
+def _played(trial: CompactRecording, size: float, model: pin.Model, other: pin.Model) -> _Played:
+    """Return a trial as a child walks it whose legs are so many times as long."""
     slower = np.sqrt(size)
     values, rate = trial.motion.values.copy(), frame_rate(trial.motion)
     values[:, :2] *= size
     count = int((len(values) - 1) * slower) + 1
     frames = np.arange(count) / slower
     q = CubicSpline(np.arange(len(values)), values)(frames)
-    soles = np.hstack([points[..., 1] for points in foot_points(child.model, q).values()])
+    soles = np.hstack([points[..., 1] for points in foot_points(model, q).values()])
     q[:, 1] -= soles.min(axis=1).mean()
     events = tuple(
         Event(event.side, event.kind, round(event.frame * slower))
         for event in trial.events
         if round(event.frame * slower) < count
     )
-    return _Played(trial, rate, frames, q, events)
+    return _Played(trial, rate, frames, q, events, model, other)
 
 
 def _recording(
     name: str,
     played: _Played,
-    child: _Body,
-    other: _Body,
     points: tuple[MarkerPoint, ...],
     noise: np.random.Generator,
 ) -> Recording:
-    paths = marker_paths(child.model, points, played.q)
+    paths = marker_paths(played.model, points, played.q)
     markers = {point.marker: i for i, point in enumerate(points)}
     positions = np.empty((len(played.q), len(markers), 3))
     for column, i in enumerate(markers.values()):
@@ -152,7 +140,7 @@ def _recording(
         positions[:, column, 1] = _ASIDE.get(points[i].link[-2:].removeprefix("_"), 0.0)
     positions += noise.normal(0.0, NOISE, positions.shape)
     plates = tuple(
-        _plate(number, stance, played, child, other)
+        _plate(number, stance, played)
         for number, stance in enumerate(_measured(played.trial), start=1)
     )
     return Recording(
@@ -160,9 +148,9 @@ def _recording(
     )
 
 
-def _plate(number: int, stance: Stance, played: _Played, child: _Body, other: _Body) -> ForcePlate:
+def _plate(number: int, stance: Stance, played: _Played) -> ForcePlate:
     """Return a plate below a stance, with the load of that stance alone."""
-    force, point = _load(stance, played, child, other)
+    force, point = _load(stance, played)
     middle = float(np.median(point[force[:, 2] > 0.0]))
     along, across = _PLATE
     aside = _ASIDE[stance.side[0]]
@@ -175,9 +163,7 @@ def _plate(number: int, stance: Stance, played: _Played, child: _Body, other: _B
     return ForcePlate(f"plate {number}", corners, samples, moment)
 
 
-def _load(
-    stance: Stance, played: _Played, child: _Body, other: _Body
-) -> tuple[np.ndarray, np.ndarray]:
+def _load(stance: Stance, played: _Played) -> tuple[np.ndarray, np.ndarray]:
     """Return force (n, 3) [N] and its forward position (n,) [m] of one stance, over all frames.
 
     The centre of pressure lies at the same share of the foot, from heel marker to toe marker, and
@@ -187,7 +173,7 @@ def _load(
     assert trial.forces is not None  # noqa: S101 - shipped recordings have forces
     rows = slice(stance.strike, stance.toe_off + 1)
     known = np.arange(stance.strike, stance.toe_off + 1)
-    heel, toe = foot_extents(other.model, trial.motion.values[rows])[side].T
+    heel, toe = foot_extents(played.other, trial.motion.values[rows])[side].T
     centre = trial.forces[f"cop_{side[0]}_x"][rows]
     seen = np.isfinite(centre)
     centre = np.interp(known, known[seen], centre[seen])
@@ -198,7 +184,7 @@ def _load(
     for axis, name in ((0, "x"), (2, "z")):
         values = np.nan_to_num(trial.forces[f"force_{side[0]}_{name}"][rows])
         force[inside, axis] = np.interp(played.frames[inside], known, values)
-    force *= child.mass / other.mass
-    heel, toe = foot_extents(child.model, played.q)[side].T
+    force *= pin.computeTotalMass(played.model) / pin.computeTotalMass(played.other)
+    heel, toe = foot_extents(played.model, played.q)[side].T
     share, beyond = (np.interp(played.frames, known, values) for values in (share, beyond))
     return force, heel + share * (toe - heel) + beyond
