@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from pinocchio.visualize import MeshcatVisualizer
 
-from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side
+from pathwalker_cli.conventions import SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.stride.series import GaitSeries
@@ -85,7 +85,7 @@ _Part = tuple[str, str, coal.CollisionGeometry, pin.SE3, np.ndarray]
 
 def _parts(walker: Walker) -> Iterator[_Part]:
     """Yield name, joint, shape, place on the joint and colour of everything that is drawn."""
-    points = body_points(walker, np.zeros(len(COORDINATES)))
+    points = body_points(walker, np.zeros(walker.skeleton.size))
     for side in SIDES:
         yield from _leg(points, side, side in walker.device.elements)
     dark = _grey(_SHADES["right"])

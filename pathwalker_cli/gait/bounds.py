@@ -9,14 +9,15 @@ from typing import Any, Final
 import numpy as np
 
 from pathwalker_cli.config import BoundsConfig, StudyConfig
-from pathwalker_cli.conventions import ANGLES, COORDINATES, GRAVITY, ROOT
+from pathwalker_cli.conventions import GRAVITY
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait import choices
-from pathwalker_cli.gait.problem import ACTIVATIONS, RESERVES, VELOCITIES
+from pathwalker_cli.gait.problem import ACTIVATIONS
 from pathwalker_cli.io.c3d_plates import LOADED
 from pathwalker_cli.io.fields import quantity_at
 from pathwalker_cli.model.contact import ContactPattern
 from pathwalker_cli.model.numbers import Unknown
+from pathwalker_cli.model.skeleton import Skeleton
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.problem import INFINITY, BoundTable
 from pathwalker_cli.patient import Patient
@@ -67,7 +68,7 @@ def gait_bounds(
     }
     entries |= _each(ACTIVATIONS, (0.0, 1.0))
     entries |= _joint_ranges(walker, config, sources)
-    entries |= _each(VELOCITIES, (-config.joint_speed, config.joint_speed))
+    entries |= _each(walker.skeleton.named("velocity"), (-config.joint_speed, config.joint_speed))
     pattern = walker.pattern
     for phase in pattern.phases:
         shortest, longest = config.phase_duration
@@ -87,7 +88,7 @@ def gait_bounds(
     entries[("walking_speed",)] = (_least_speed(walker, config, sources), INFINITY)
     ranges, keys = _unknowns(walker, config, free, sources)
     entries |= {(name,): pair for name, pair in ranges.items()}
-    entries |= _each(RESERVES, (0.0, 0.0))
+    entries |= _each(walker.skeleton.named("reserve"), (0.0, 0.0))
     return GaitBounds(BoundTable(entries), sources, ranges, keys)
 
 
@@ -100,24 +101,27 @@ def recorded_durations(bounds: GaitBounds, durations: Mapping[str, float]) -> Ga
 
 
 def tracking_bounds(
-    bounds: GaitBounds, durations: Mapping[str, float], held: Mapping[str, float]
+    skeleton: Skeleton,
+    bounds: GaitBounds,
+    durations: Mapping[str, float],
+    held: Mapping[str, float],
 ) -> BoundTable:
     """Return the bounds of the first stage: given durations and parameters, free reserves.
 
     Durations [s] are given by phase, the values that are held [SI] by unknown.
     """
-    changes = _each((*RESERVES, "walking_speed"), ANYTHING)
-    changes |= _each(ANGLES, choices.TRACKING_ANGLES)
+    changes = _each((*skeleton.named("reserve"), "walking_speed"), ANYTHING)
+    changes |= _each(skeleton.angles, choices.TRACKING_ANGLES)
     changes |= {(name,): (value, value) for name, value in held.items()}
     return recorded_durations(bounds, durations).table.replace(changes)
 
 
-def helped_bounds(bounds: GaitBounds) -> BoundTable:
+def helped_bounds(skeleton: Skeleton, bounds: GaitBounds) -> BoundTable:
     """Return the bounds of a prediction with free reserves at the joints.
 
     The pelvis gets none: nobody carries the patient.
     """
-    helping = (name for name in COORDINATES if name not in ROOT)
+    helping = (name for name in skeleton.coordinates if name not in skeleton.root)
     return bounds.table.replace(_each((f"{name}_reserve" for name in helping), ANYTHING))
 
 

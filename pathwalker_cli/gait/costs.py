@@ -44,6 +44,7 @@ class Instant:
         heights: Heights of the places in the air, in the order of the walker's pattern [m].
         speeds: Their forward velocities [m/s].
         worn: Torques of the orthoses right, left [N m]; 0 where none is worn.
+        coordinates: Names of the coordinates.
         power: Power of the activations in the effort.
         data: Numbers of the term, see `CostTerm.size`.
     """
@@ -61,6 +62,7 @@ class Instant:
     heights: Sequence[Any] = ()
     speeds: Sequence[Any] = ()
     worn: Sequence[Any] = ()
+    coordinates: Sequence[str] = field(default=COORDINATES, kw_only=True)
     power: int = field(default=2, kw_only=True)
     data: Sequence[Any] = ()
 
@@ -84,7 +86,7 @@ class Instant:
 
     def angle(self, name: str) -> Any:
         """Return a coordinate by its name."""
-        return self.q[COORDINATES.index(name)]
+        return self.q[self.coordinates.index(name)]
 
 
 @dataclass(frozen=True)

@@ -291,7 +291,7 @@ class GaitSolver:
 
         Returns None if not even reserves lead to a motion within the bounds.
         """
-        table = helped_bounds(self.bounds)
+        table = helped_bounds(self.walker.skeleton, self.bounds)
         numbers = self.numbers(choices.HELPED, table)
         program, result = self.stage("helped", motion, numbers, settings)
         if not result.converged:
@@ -311,8 +311,8 @@ class GaitSolver:
 
     def whole_stride(self, program: CollocationProgram, result: NlpResult) -> PhasedMotion:
         """Return the motion of a whole stride, of half a cycle with its mirror image."""
-        motion = program.to_motion(result.unknowns)
-        return full_stride(motion) if self.config.half_cycle else motion
+        motion, skeleton = program.to_motion(result.unknowns), self.walker.skeleton
+        return full_stride(skeleton, motion) if self.config.half_cycle else motion
 
     def _tracked_on_soles(self) -> PhasedMotion:
         """Follow the stride of the start on soles that roll; return it sunk into the ground.
@@ -345,7 +345,8 @@ class GaitSolver:
         """
         mesh, stride, unknowns = self.config.mesh, self.stride, self.walker.unknowns
         held = self.parameter_guess() * [choices.FADED if u.faded else 1.0 for u in unknowns]
-        table = tracking_bounds(self.bounds, self._durations, self.by_name(held))
+        skeleton, values = self.walker.skeleton, self.by_name(held)
+        table = tracking_bounds(skeleton, self.bounds, self._durations, values)
         meshes = meshing.first(stride.durations[: len(self.gait.phases)], mesh)
         costs = len(self.gait.costs.integrals)
         motion = stride.motion(self.walker, held, meshes, mesh.degree, costs)

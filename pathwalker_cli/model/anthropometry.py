@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from pathwalker_cli.conventions import SIDES, SUFFIX, Condition
 from pathwalker_cli.model.devices import device_on
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 
 if TYPE_CHECKING:
     from pathwalker_cli.patient import Patient
@@ -120,6 +121,7 @@ def segments(
     condition: Condition,
     published: bool = False,
     values: Mapping[str, float] | None = None,
+    skeleton: Skeleton = PLANAR_WALKER,
 ) -> tuple[Segment, ...]:
     """Return the segments of a patient, parents before children.
 
@@ -129,6 +131,7 @@ def segments(
         published: Hang the right lower arm and hand where the published model has them: at the
             length of the segment itself below its parent's origin instead of at the parent's.
         values: Masses of the device by address [kg], if not those of the patient's file.
+        skeleton: Which joints there are.
     """
     mass = (values or {}).get
     added = {

@@ -22,7 +22,7 @@ from pathwalker_cli.model.elements import ForceElement, registered_elements
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
 from pathwalker_cli.model.elements.tissue import leg_tissue
 from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at
-from pathwalker_cli.model.skeleton import Side
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, Side, Skeleton
 
 _MUSCLES: Final = generators()
 _TISSUE: Final = leg_tissue()
@@ -47,6 +47,11 @@ class Parts:
     contact: Contact = HEEL_TOE
     further: tuple[str, ...] = ()
     braced: tuple[Side, ...] = ()
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """Bodies and joints."""
+        return PLANAR_WALKER
 
     @property
     def pattern(self) -> ContactPattern:

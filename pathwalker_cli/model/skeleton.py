@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal
 
+import numpy as np
+
 Side = Literal["right", "left"]
 SIDES: Final[tuple[Side, Side]] = ("right", "left")
 SUFFIX: Final[dict[str, str]] = {"right": "r", "left": "l"}
@@ -74,6 +76,15 @@ class Skeleton:
     def index(self, coordinate: str) -> int:
         """Return the position of a coordinate."""
         return self.coordinates.index(coordinate)
+
+    def named(self, what: str) -> tuple[str, ...]:
+        """Return names of what belongs to every coordinate, e.g. "velocity"."""
+        return tuple(f"{name}_{what}" for name in self.coordinates)
+
+    def completed(self, q: np.ndarray) -> np.ndarray:
+        """Return postures (..., m) with the coordinates behind the first m at 0, (..., size)."""
+        further = np.zeros((*q.shape[:-1], self.size - q.shape[-1]))
+        return np.concatenate([q, further], axis=-1)
 
 
 def _leg(side: Side) -> tuple[Joint, ...]:

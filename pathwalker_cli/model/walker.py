@@ -32,7 +32,7 @@ from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator
 from pathwalker_cli.model.elements.orthosis import OrthosisSide
 from pathwalker_cli.model.numbers import Number, Unknown
 from pathwalker_cli.model.parts import Parts
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, Side, Skeleton
+from pathwalker_cli.model.skeleton import Side, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 
@@ -43,7 +43,6 @@ class Walker:
 
     Args:
         parts: What it is made of.
-        skeleton: Bodies and joints; names and order of the coordinates.
         model: Rigid bodies in Pinocchio.
         rigid_body: The same as CasADi functions.
         values: Every named number by address [SI].
@@ -54,7 +53,6 @@ class Walker:
 
     patient: Patient
     parts: Parts
-    skeleton: Skeleton
     model: pin.Model
     rigid_body: RigidBodyFunctions
     values: Mapping[str, float]
@@ -65,6 +63,11 @@ class Walker:
     def __repr__(self) -> str:
         """Return who walks, and with what."""
         return f"Walker({self.patient.id!r}, {self.condition!r}, {self.total_mass:.1f} kg)"
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """Bodies and joints: names and order of the coordinates."""
+        return self.parts.skeleton
 
     @property
     def backend(self) -> str:
@@ -155,7 +158,7 @@ class Walker:
         bodies = [n.address for n in self.parts.body_numbers]
         if all(values[address] == self.values[address] for address in bodies):
             return changed
-        model = pinocchio_model(self.patient, self.condition, self.published, values)
+        model = pinocchio_model(self.patient, self.condition, self.published, values, self.skeleton)
         parameters = self.rigid_body.parameters_for(model, changed.shapes)
         return replace(
             changed, model=model, rigid_body=replace(self.rigid_body, parameters=parameters)
@@ -362,15 +365,28 @@ class Walker:
             Forward and up [m], shape (k, 2): right heel, right toe, left heel, left toe; of soles
             right and left.
         """
-        q, body = _vector(q, self.skeleton.size, "q"), self.rigid_body
+        q, body = self._posture(q), self.rigid_body
         return np.asarray(body.point_positions(q, body.parameters)).reshape(-1, 2)
 
     def foot_points(self, q: Any) -> np.ndarray:
         """Return right heel, right toe, left heel, left toe of q (10,): forward, up [m], (4, 2)."""
+        frames = self.frames(q)
+        return np.array([frames[point.name] for point in POINTS])
+
+    def frames(self, q: Any) -> dict[str, np.ndarray]:
+        """Return where all frames are in q: forward, up [m], by name.
+
+        Joints that q leaves out at its end, as recordings do, are at 0.
+        """
         data = self.model.createData()
-        pin.framesForwardKinematics(self.model, data, _vector(q, self.skeleton.size, "q"))
-        frames = [self.model.getFrameId(point.name) for point in POINTS]
-        return np.array([data.oMf[frame].translation[[0, 2]] for frame in frames])
+        pin.framesForwardKinematics(self.model, data, self._posture(q))
+        pairs = zip(self.model.frames, data.oMf, strict=True)
+        return {frame.name: place.translation[[0, 2]].copy() for frame, place in pairs}
+
+    def _posture(self, q: Any) -> np.ndarray:
+        """Return all coordinates of a posture, of which q may leave out the last ones."""
+        given = np.asarray(q, dtype=float).ravel()[: self.skeleton.size]
+        return _vector(self.skeleton.completed(given), self.skeleton.size, "q")
 
     @cached_property
     def contact_motion(self) -> ca.Function:
@@ -450,13 +466,12 @@ def walker_of(
     """
     if parts.condition == "orthosis":
         patient.require_orthosis()
-    model = pinocchio_model(patient, parts.condition, published)
+    model = pinocchio_model(patient, parts.condition, published, skeleton=parts.skeleton)
     values = {n.address: n.value_for(patient) for n in parts.numbers}
     frames, shapes = [point.name for point in POINTS], [values[n.address] for n in parts.shapes]
     return Walker(
         patient=patient,
         parts=parts,
-        skeleton=PLANAR_WALKER,
         model=model,
         rigid_body=rigid_body_functions(model, frames, backend, shapes, parts.soles),
         values=values,

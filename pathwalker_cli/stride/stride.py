@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
-import pinocchio as pin
 from scipy.integrate import trapezoid
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX, Side
@@ -46,7 +45,8 @@ class Stride(Sampled):
         name: What to call it: the folder of a run, or the recorded trial.
         walker: Who walks: mass and weight with what is worn, and leg length.
         time: Instants from 0 on [s], never decreasing, shape (n,).
-        q: Generalised coordinates [m, rad], shape (n, 10).
+        q: Generalised coordinates [m, rad], shape (n, 10), of further joints too where they are
+            known.
         stances: Per side, its foot strike and the toe-off that ends this stance [s]; later than
             the end where the stance goes on at the beginning of the stride.
         problem: The problem that it solves, e.g. "mapd-orthosis"; "" for a recorded one.
@@ -97,7 +97,9 @@ class Stride(Sampled):
     def __post_init__(self) -> None:
         """Check the shapes."""
         n, columns = self.time.size, {"muscle_torque": len(GENERATORS), "orthosis_torque": 2}
-        columns |= dict.fromkeys(("q", "v", "net_torque"), len(COORDINATES))
+        recorded, all_joints = len(COORDINATES), self.walker.skeleton.size
+        width = recorded if self.q.shape[1:] == (recorded,) else all_joints
+        columns |= dict.fromkeys(("q", "v", "net_torque"), width)
         pattern = self.walker.pattern
         columns |= {"activation": len(GENERATORS), "point_force": len(pattern.forces)}
         checked = [(name, getattr(self, name), width) for name, width in columns.items()]
@@ -416,13 +418,9 @@ def body_points(walker: Walker, q: np.ndarray) -> dict[str, np.ndarray]:
         walker: Who walks.
         q: Generalised coordinates, shape (10,).
     """
-    data = walker.model.createData()
-    pin.framesForwardKinematics(walker.model, data, np.asarray(q, dtype=float))
+    frames = walker.frames(q)
     legs = [f"{name}_{s}" for name in ("hip", "knee", "ankle", "heel", "toe") for s in "rl"]
-    points = {
-        name: data.oMf[walker.model.getFrameId(name)].translation[[0, 2]].copy()
-        for name in (*legs, "lumbar", "head")
-    }
+    points = {name: frames[name] for name in (*legs, "lumbar", "head")}
     points["neck"] = points.pop("head")
     points["head"] = points["neck"] + 0.25 * (points["neck"] - points["lumbar"])
     return points
