@@ -17,7 +17,7 @@ from pathwalker_cli.io.c3d_plates import LOADED
 from pathwalker_cli.io.fields import quantity_at
 from pathwalker_cli.model.contact import ContactPattern
 from pathwalker_cli.model.numbers import Unknown
-from pathwalker_cli.model.skeleton import Skeleton
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.problem import INFINITY, BoundTable
 from pathwalker_cli.patient import Patient
@@ -79,9 +79,10 @@ def gait_bounds(
     if walker.parts.compliant:
         entries |= _toe_off(pattern)
     else:
-        loads = (force.name for force in pattern.forces if force.bears)
+        rigid = [point for point in pattern.points if point not in pattern.yielding]
+        loads = (f"{point.name}_z" for point in rigid)
         entries |= _each(loads, (config.least_vertical_force, INFINITY))
-        heights = (f"{point.name} height" for point in pattern.points)
+        heights = (f"{point.name} height" for point in rigid)
         entries |= _each(heights, (config.least_height, INFINITY))
         entries |= _lift_off(pattern)
     entries[("distance",)] = config.distance
@@ -156,12 +157,16 @@ def _lift_off(pattern: ContactPattern) -> Entries:
 
 
 def _toe_off(pattern: ContactPattern) -> Entries:
-    """Return the force at the last instant of each step, where its foot counts as lifted."""
+    """Return the force at the last instant of each step, where its foot counts as lifted.
+
+    Of feet with toes it is the tip that leaves the ground.
+    """
+    toes = any(point.soft for point in pattern.points)
     return {
         (force.name, phase.name, "end"): (LOADED, LOADED)
         for phase in pattern.phases
         for force in phase.forces
-        if force.bears and force.point.side == phase.step
+        if force.bears and force.point.side == phase.step and force.point.soft == toes
     }
 
 
@@ -176,6 +181,9 @@ def _joint_ranges(walker: Walker, config: BoundsConfig, sources: dict[str, str])
             low, high = recorded.joint_ranges[name]
             low, high = low - margin, high + margin
             source = f"barefoot recordings widened by {margin:g} rad"
+        elif name not in PLANAR_WALKER.angles:
+            low, high = choices.TOE_ANGLES
+            source = "what toes can do"
         elif name in config.fallback_joint_ranges:
             low, high = config.fallback_joint_ranges[name]
             source = "fallback: the patient has no recordings"

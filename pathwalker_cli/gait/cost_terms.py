@@ -85,7 +85,7 @@ def _totals(motion: PhasedMotion, integrals: Mapping[str, float]) -> Totals:
 
 def _goal_gains(phase: PhaseMotion, costs: Costs, walker: Walker) -> np.ndarray:
     """Return the integrals of the goals' running costs over every interval, shape (N, k)."""
-    contact, n = phase_named(phase.name), walker.skeleton.size
+    contact, n = walker.pattern.phase(phase.name), walker.skeleton.size
     shape = phase.inner_states.shape[:2]
     fractions = phase.point_fractions.ravel()
     activation, rate = (

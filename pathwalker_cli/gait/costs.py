@@ -75,8 +75,11 @@ class Instant:
         if not self.phase.compliant:
             return {SUFFIX[side]: float(side in self.phase.feet) for side in SIDES}
         pairs = zip(self.phase.forces, self.force, strict=True)
-        loads = {SUFFIX[f.point.side]: value**2 for f, value in pairs if f.bears}
-        return {side: load / (load + LOADED**2) for side, load in loads.items()}
+        loads: dict[str, Any] = {}
+        for f, value in pairs:
+            if f.bears:
+                loads[SUFFIX[f.point.side]] = loads.get(SUFFIX[f.point.side], 0.0) + value
+        return {side: load**2 / (load**2 + LOADED**2) for side, load in loads.items()}
 
     @property
     def vertical_force(self) -> dict[str, Any]:

@@ -231,17 +231,18 @@ class GaitProblem:
         balance = body.inverse_dynamics(self.q, self.v, vdot, theta) - tau - reserve
         balance -= jacobian.T @ force
         equations = tuple(f"{name} equation of motion" for name in skeleton.coordinates)
-        if contact.compliant:
-            given, what = force - self._ground_forces(position, velocity), "{0.name} force"
-        else:
-            given, what = acceleration, "{0.name} contact acceleration"
+        law = self._ground_forces(position, velocity)
+        soft = [contact.forces.index(f) for f in contact.yielding]
+        laws = tuple(f"{f.name} force" for f in contact.yielding)
+        still = "{0.name} contact acceleration"
         return Phase(
             name=contact.name,
             algebraic=z,
             derivative=ca.vertcat(self.v, vdot),
             residual=Rows.join(
                 Rows.make(balance, equations, choices.FORCE_SIZE),
-                self._rows(given, contact.forces, what, choices.FORCE_SIZE),
+                self._rows(acceleration, contact.rigid, still, choices.FORCE_SIZE),
+                Rows.make(force[soft] - law, laws, choices.FORCE_SIZE),
             ),
             path=self._path(contact, force, position),
             end=self._touch_down(contact.touched_down(following), position, velocity, acceleration),
@@ -260,15 +261,16 @@ class GaitProblem:
         )
 
     def _ground_forces(self, position: ca.SX, velocity: ca.SX) -> ca.SX:
-        """Return the forces on soles that give way, in the order of the pattern [N]."""
+        """Return the forces on places that give way, in the order of the pattern [N]."""
         constants = self.constants
         known = {**constants.numbers, **self._free}, constants.weight, constants.friction
         at, moved = ca.vertsplit(position), ca.vertsplit(velocity)
         forces = (
             ground_force(place, at[2 * i + 1], (moved[2 * i], moved[2 * i + 1]), *known)
             for i, place in enumerate(self.pattern.points)
+            if place in self.pattern.yielding
         )
-        return ca.vertcat(*(component for pair in forces for component in pair))
+        return ca.vertcat(ca.SX(0, 1), *(component for pair in forces for component in pair))
 
     def _integrands(
         self,
@@ -316,7 +318,8 @@ class GaitProblem:
         height = "{0.point.name} height"
         rows = [self._rows(position, airborne, height, choices.HEIGHT_SIZE, INFINITY)]
         for side in sorted(contact.feet):
-            parts = [(f, force[i]) for i, f in enumerate(contact.forces) if f.point.side == side]
+            parts = [(f, force[contact.forces.index(f)]) for f in contact.rigid]
+            parts = [(f, value) for f, value in parts if f.point.side == side]
             normal = sum(value for f, value in parts if f.bears)
             tangent = sum(value for f, value in parts if not f.bears)
             cone = self.constants.friction * normal

@@ -311,8 +311,8 @@ class GaitSolver:
 
     def whole_stride(self, program: CollocationProgram, result: NlpResult) -> PhasedMotion:
         """Return the motion of a whole stride, of half a cycle with its mirror image."""
-        motion, skeleton = program.to_motion(result.unknowns), self.walker.skeleton
-        return full_stride(skeleton, motion) if self.config.half_cycle else motion
+        motion = program.to_motion(result.unknowns)
+        return full_stride(self.walker.parts, motion) if self.config.half_cycle else motion
 
     def _tracked_on_soles(self) -> PhasedMotion:
         """Follow the stride of the start on soles that roll; return it sunk into the ground.

@@ -8,11 +8,27 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pathwalker_cli.conventions import GENERATORS
+from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX
 from pathwalker_cli.gait import choices
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_points
 from pathwalker_cli.trajectory import Trajectory
+
+
+def with_toes(walker: Walker, q: np.ndarray) -> np.ndarray:
+    """Return postures (n, 10) with those of further joints, (n, size).
+
+    Toes are in line with the foot, or on the ground where that would press them into it.
+    """
+    completed = walker.skeleton.completed(q)
+    for side in SIDES if walker.parts.toes else ():
+        s, length = SUFFIX[side], walker.patient.toes_length(side)
+        chain = ("pelvis_tilt", *(f"{joint}_{s}" for joint in LEG_JOINTS))
+        pitch = completed[:, [walker.skeleton.index(name) for name in chain]].sum(axis=1)
+        height = np.array([walker.frames(posture)[f"toe_{s}"][1] for posture in completed])
+        lowest = np.arcsin(np.clip(height / length, 0.0, 1.0))  # pitch of toes that just touch
+        completed[:, walker.skeleton.index(f"mtp_{s}")] = np.minimum(lowest - pitch, 0.0)
+    return completed
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from pathwalker_cli.conventions import GENERATORS, mirror_permutation, mirrored
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.problem import algebraic_names
-from pathwalker_cli.model.contact import mirrored_phase, phase_named
-from pathwalker_cli.model.skeleton import Skeleton
+from pathwalker_cli.model.contact import mirrored_phase
+from pathwalker_cli.model.parts import Parts
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
@@ -60,19 +60,18 @@ def require_symmetry(walker: Walker) -> None:
         )
 
 
-def full_stride(skeleton: Skeleton, step: PhasedMotion) -> PhasedMotion:
+def full_stride(parts: Parts, step: PhasedMotion) -> PhasedMotion:
     """Return a step, which ends in its own mirrored beginning, followed by its mirror image."""
     length = walked_distance(step)
     costs = step.phases[-1].integrals[-1] - step.phases[0].integrals[0]
-    second = tuple(_mirrored(skeleton, phase, length, costs) for phase in step.phases)
+    second = tuple(_mirrored(parts, phase, length, costs) for phase in step.phases)
     return PhasedMotion(step.phases + second, step.parameters)
 
 
-def _mirrored(
-    skeleton: Skeleton, phase: PhaseMotion, length: float, costs: np.ndarray
-) -> PhaseMotion:
+def _mirrored(parts: Parts, phase: PhaseMotion, length: float, costs: np.ndarray) -> PhaseMotion:
     """Return a phase with left and right exchanged, one step on."""
-    here, there = phase_named(phase.name), mirrored_phase(phase.name)
+    skeleton, pattern = parts.skeleton, parts.pattern
+    here, there = (pattern.phase(p) for p in (phase.name, mirrored_phase(phase.name).name))
     names, wanted = (algebraic_names(skeleton, contact) for contact in (here, there))
     muscles = mirror_permutation(GENERATORS)
     order = mirror_permutation(skeleton.coordinates + skeleton.named("velocity"))

@@ -19,7 +19,8 @@ import numpy as np
 from pathwalker_cli.conventions import COORDINATES, ROOT
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.motion_file import read_arrays, read_motion
-from pathwalker_cli.model.contact import Feet, contact_pattern
+from pathwalker_cli.gait.start import with_toes
+from pathwalker_cli.model.contact import TIPS, Feet, contact_pattern
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.paths import shipped
@@ -69,7 +70,8 @@ class TypicalWalk:
         length, mass = self._size(walker)
         needed = self._needed(walker)
         phases = (_scaled(phase, length, mass, needed) for phase in self.motion.phases)
-        return PhasedMotion(tuple(phases), parameters)
+        completed = (_with_toes(walker, phase) for phase in phases)
+        return PhasedMotion(tuple(completed), parameters)
 
     def distance(self, walker: Walker) -> float:
         """Return how different the muscles are: root mean square of log(activation needed)."""
@@ -96,6 +98,28 @@ def typical_walks(walker: Walker) -> list[TypicalWalk]:
     walks = (TypicalWalk.read(path) for path in paths)
     fitting = [walk for walk in walks if walk.phases == phases]
     return sorted(fitting, key=lambda walk: walk.distance(walker))
+
+
+def _with_toes(walker: Walker, phase: PhaseMotion) -> PhaseMotion:
+    """Return a phase with the joints and contacts that a walker has besides, its toes at rest."""
+    if not walker.parts.toes:
+        return phase
+    n, more = len(COORDINATES), walker.skeleton.size - len(COORDINATES)
+
+    def states(given: np.ndarray) -> np.ndarray:
+        q, v = np.split(given.reshape(-1, 2 * n), 2, axis=1)
+        both = np.hstack([with_toes(walker, q), walker.skeleton.completed(v)])
+        return both.reshape(*given.shape[:-1], -1)
+
+    split = np.split(phase.algebraic, [n, phase.algebraic.shape[-1] - n], axis=-1)
+    parts = zip(split, (more, 2 * len(TIPS), more), strict=True)
+    behind = [np.pad(part, [(0, 0), (0, 0), (0, width)]) for part, width in parts]
+    return replace(
+        phase,
+        states=states(phase.states),
+        inner_states=states(phase.inner_states),
+        algebraic=np.concatenate(behind, axis=-1),
+    )
 
 
 _TRANSLATIONS: Final = np.array([name in ROOT[:2] for name in COORDINATES])

@@ -2,7 +2,8 @@
 
 World frame: x forward, z up, rotations about +y (right-hand rule), SI units and radians.
 Positive: pelvis_tilt and lumbar = forward lean, hip = extension, knee = flexion,
-ankle = plantarflexion.  The zero pose is upright with straight legs and feet at 90 degrees.
+ankle = plantarflexion, mtp (toes) = flexion, so that it is negative when the heel rises.  The zero
+pose is upright with straight legs and feet at 90 degrees.
 """
 
 from __future__ import annotations
@@ -107,3 +108,12 @@ PLANAR_WALKER: Final = Skeleton(
     )
 )
 """The sagittal walker of Sreenivasa et al. (2017): two translations, eight angles."""
+
+TOED_WALKER: Final = Skeleton(
+    (
+        *PLANAR_WALKER.joints,
+        Joint("mtp_r", "foot_r", "toes_r", side="right"),
+        Joint("mtp_l", "foot_l", "toes_l", side="left"),
+    )
+)
+"""The same with a metatarsophalangeal joint in each foot."""

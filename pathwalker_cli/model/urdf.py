@@ -14,8 +14,8 @@ import pinocchio as pin
 
 from pathwalker_cli.conventions import GRAVITY, Condition
 from pathwalker_cli.model.anthropometry import Segment, Vector, segments
-from pathwalker_cli.model.contact import POINTS
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, Joint, Skeleton
+from pathwalker_cli.model.contact import POINTS, TIPS, ContactPoint
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, TOED_WALKER, Joint, Skeleton
 from pathwalker_cli.patient import Patient
 
 _LIMITS: Final = '<limit lower="{0}" upper="{1}" effort="1000" velocity="100"/>'
@@ -49,8 +49,9 @@ def urdf_text(
         lines += _link(part)
         if part.parent:
             lines += _joint(part.joint, part.parent, part.name, part.origin)
-    for point in POINTS:
-        x, z = getattr(patient.contacts(condition)[point.side], point.place)
+    tips = TIPS if skeleton is TOED_WALKER else ()
+    for point in (*POINTS, *tips):
+        x, z = point_place(patient, condition, point)
         lines.append(f'  <link name="{point.name}"/>')
         lines += _joint("", point.link, point.name, (x, 0.0, z))
     return "\n".join([*lines, "</robot>", ""])
@@ -68,6 +69,14 @@ def pinocchio_model(
     model = _ordered(pin.buildModelFromXML(text), skeleton)
     model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
     return model
+
+
+def point_place(patient: Patient, condition: Condition, point: ContactPoint) -> tuple[float, float]:
+    """Return where a point is in the frame of its link: forward, up [m]."""
+    if point.soft:
+        return patient.toes_length(point.side), 0.0
+    x, z = getattr(patient.contacts(condition)[point.side], point.place)
+    return float(x), float(z)
 
 
 def _numbers(values: Iterable[float]) -> str:
