@@ -42,7 +42,7 @@ from pathwalker_cli.gait.solution import (
 from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.gait.stylised import stylised_stride
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
-from pathwalker_cli.gait.typical import TypicalWalk, typical_walks
+from pathwalker_cli.gait.typical import TypicalWalk, completed, typical_walks
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
 from pathwalker_cli.nlp.watch import ProgressReport
@@ -242,7 +242,8 @@ class GaitSolver:
 
     def _typical_motion(self, walk: TypicalWalk) -> PhasedMotion:
         """Return a typical walk on the first mesh, scaled to the walker."""
-        motion, mesh = walk.scaled(self.walker, self.parameter_guess()), self.config.mesh
+        scaled, mesh = walk.scaled(self.walker, self.parameter_guess()), self.config.mesh
+        motion = completed(self.walker, scaled, self.bounds.table)
         if self.walker.parts.compliant:
             motion = sunk(self.walker, motion)
         motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])

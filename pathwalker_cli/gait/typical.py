@@ -23,6 +23,7 @@ from pathwalker_cli.gait.start import with_toes
 from pathwalker_cli.model.contact import TIPS, Feet, contact_pattern
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
+from pathwalker_cli.ocp.problem import BoundTable
 from pathwalker_cli.paths import shipped
 
 
@@ -70,8 +71,7 @@ class TypicalWalk:
         length, mass = self._size(walker)
         needed = self._needed(walker)
         phases = (_scaled(phase, length, mass, needed) for phase in self.motion.phases)
-        completed = (_with_toes(walker, phase) for phase in phases)
-        return PhasedMotion(tuple(completed), parameters)
+        return PhasedMotion(tuple(phases), parameters)
 
     def distance(self, walker: Walker) -> float:
         """Return how different the muscles are: root mean square of log(activation needed)."""
@@ -100,25 +100,38 @@ def typical_walks(walker: Walker) -> list[TypicalWalk]:
     return sorted(fitting, key=lambda walk: walk.distance(walker))
 
 
-def _with_toes(walker: Walker, phase: PhaseMotion) -> PhaseMotion:
-    """Return a phase with the joints and contacts that a walker has besides, its toes at rest."""
+def completed(walker: Walker, motion: PhasedMotion, table: BoundTable) -> PhasedMotion:
+    """Return a motion of ten coordinates with the toes of a walker, if a joint carries them.
+
+    Postures are first brought within their bounds: toes that stand on the ground then stay there.
+    """
     if not walker.parts.toes:
-        return phase
+        return motion
     n, more = len(COORDINATES), walker.skeleton.size - len(COORDINATES)
+    lower, upper = table.arrays(COORDINATES)
 
     def states(given: np.ndarray) -> np.ndarray:
         q, v = np.split(given.reshape(-1, 2 * n), 2, axis=1)
-        both = np.hstack([with_toes(walker, q), walker.skeleton.completed(v)])
-        return both.reshape(*given.shape[:-1], -1)
+        q = with_toes(walker, np.clip(q, lower, upper))
+        return np.hstack([q, walker.skeleton.completed(v)]).reshape(*given.shape[:-1], -1)
 
-    split = np.split(phase.algebraic, [n, phase.algebraic.shape[-1] - n], axis=-1)
-    parts = zip(split, (more, 2 * len(TIPS), more), strict=True)
-    behind = [np.pad(part, [(0, 0), (0, 0), (0, width)]) for part, width in parts]
+    def algebraic(given: np.ndarray) -> np.ndarray:
+        parts = np.split(given, [n, given.shape[-1] - n], axis=-1)
+        pairs = zip(parts, (more, 2 * len(TIPS), more), strict=True)
+        padded = [np.pad(part, [(0, 0), (0, 0), (0, width)]) for part, width in pairs]
+        return np.concatenate(padded, axis=-1)
+
     return replace(
-        phase,
-        states=states(phase.states),
-        inner_states=states(phase.inner_states),
-        algebraic=np.concatenate(behind, axis=-1),
+        motion,
+        phases=tuple(
+            replace(
+                phase,
+                states=states(phase.states),
+                inner_states=states(phase.inner_states),
+                algebraic=algebraic(phase.algebraic),
+            )
+            for phase in motion.phases
+        ),
     )
 
 

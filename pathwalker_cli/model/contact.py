@@ -136,9 +136,7 @@ class ContactPoint:
         """Numbers of what gives way: depth under body weight, damping, sliding speed."""
 
         def depth(patient: Patient) -> float:
-            side = self.side
-            length = patient.toes_length(side) if self.soft else patient.length("foot", side)
-            return SOLE_DEPTH * length
+            return SOLE_DEPTH * patient.length("foot", self.side)
 
         source = "Ackermann and van den Bogert (2010), scaled, see model.choices"
         entries: tuple[tuple[str, str, str, Any], ...] = (
