@@ -116,6 +116,9 @@ def _leg(points: dict[str, np.ndarray], side: Side, with_orthosis: bool) -> Iter
     ]
     if with_orthosis:
         lines.append(("shell", "knee", 0.54 * ankle, 0.86 * ankle, _SHELL, _BLUE))
+    if f"tip_{s}" in points:
+        toes = _between(points, f"toe_{s}", f"tip_{s}")
+        lines.append(("toes", "mtp", up, toes + up, _FOOT, colour))
     for name, joint, start, end, radius, shade in lines:
         shape, place = _capsule(start + across, end + across, radius)
         yield f"{name}_{s}", f"{joint}_{s}", shape, place, shade

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import (
+    COORDINATES,
     ROOT,
     SIDES,
     SUFFIX,
@@ -21,7 +22,6 @@ from pathwalker_cli.conventions import (
 from pathwalker_cli.export.osim import joint_path, optimal_forces
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.opensim import force_table, torque_table
-from pathwalker_cli.model.contact import POINTS
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import body_points
 from pathwalker_cli.trajectory import Trajectory
@@ -103,8 +103,8 @@ def points(series: GaitSeries, name: str) -> Recording:
     """Return where joints, heels and toes are, `RATE` frames a second, as a recording."""
     frames = np.arange(int(series.duration * RATE) + 1) / RATE
     places = [body_points(series.walker, q) for q in motion_table(series).at(frames)]
-    joints = (name for name in series.walker.skeleton.coordinates if name not in ROOT)
-    markers = (*joints, *(point.name for point in POINTS))
+    ends = (point.name for point in series.walker.parts.frames)
+    markers = (*(name for name in COORDINATES if name not in ROOT), *ends)
     positions = np.zeros((frames.size, len(markers), 3))
     positions[..., [0, 2]] = [[place[marker] for marker in markers] for place in places]
     return Recording(name, RATE, markers, positions, (), (), 1)

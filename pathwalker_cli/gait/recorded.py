@@ -16,7 +16,7 @@ from pathwalker_cli.config import StartConfig
 from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES, coordinate_unit
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait import choices
-from pathwalker_cli.gait.start import ReferenceStride, with_toes
+from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.io.recordings import CompactRecording, read_recording, start_names
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.problem import Sample
@@ -110,10 +110,10 @@ def recorded_passage(walker: Walker, recording: CompactRecording) -> ReferenceSt
 
 
 def _of_all_joints(walker: Walker, time: np.ndarray, values: np.ndarray) -> Trajectory:
-    """Return recorded coordinates (n, 10) with those of further joints."""
+    """Return recorded coordinates (n, 10) with those of further joints at 0."""
     names = walker.skeleton.coordinates
     units = tuple(map(coordinate_unit, names))
-    return Trajectory(time, names, with_toes(walker, values), units)
+    return Trajectory(time, names, walker.skeleton.completed(values), units)
 
 
 def passage_samples(passage: ReferenceStride) -> tuple[Sample, ...]:

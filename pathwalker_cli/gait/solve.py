@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -243,18 +243,21 @@ class GaitSolver:
     def _typical_motion(self, walk: TypicalWalk) -> PhasedMotion:
         """Return a typical walk on the first mesh, scaled to the walker."""
         scaled, mesh = walk.scaled(self.walker, self.parameter_guess()), self.config.mesh
-        motion = completed(self.walker, scaled, self.bounds.table)
-        if self.walker.parts.compliant:
-            motion = sunk(self.walker, motion)
+        motion = self._on_own_feet(scaled)
         motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])
         motion = with_goal_costs(motion, self.gait.costs, self.walker)
         return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
 
+    def _on_own_feet(self, motion: PhasedMotion) -> PhasedMotion:
+        """Return a motion on rigid feet on those of the walker."""
+        motion = completed(self.walker, motion, self.bounds.table)
+        return sunk(self.walker, motion) if self.walker.parts.compliant else motion
+
     def _from_stride(self, tolerance: float) -> tuple[str, Stage]:
         """Predict on the first mesh from the config's stride, which is tracked first."""
         settings = self.settings(tolerance, self.config.solver.first_barrier)
-        if self.walker.parts.compliant:
-            return self.stride.name, self._on_first_mesh(self._tracked_on_soles(), settings)
+        if self.walker.parts.compliant or self.walker.parts.toes:
+            return self.stride.name, self._on_first_mesh(self._tracked_on_rigid_feet(), settings)
         program, result = self._track()
         if not self._interrupted:
             motion = program.to_motion(result.unknowns)
@@ -315,27 +318,27 @@ class GaitSolver:
         motion = program.to_motion(result.unknowns)
         return full_stride(self.walker.parts, motion) if self.config.half_cycle else motion
 
-    def _tracked_on_soles(self) -> PhasedMotion:
-        """Follow the stride of the start on soles that roll; return it sunk into the ground.
+    def _tracked_on_rigid_feet(self) -> PhasedMotion:
+        """Follow the stride of the start on feet that do not give way; return it on those that do.
 
         Raises:
             KeyboardInterrupt: If the user stops it: there is no iterate of this problem yet.
         """
-        config, mesh = self.config, self.config.mesh
-        law = {n.place for point in self.walker.pattern.points for n in point.law}
-        intervals = mesh.intervals if isinstance(mesh.intervals, int) else sum(mesh.intervals)
-        values = {
-            "model.feet": "sole",
-            "mesh.intervals": intervals,
-            "bounds.phase_durations": {},
-            "free": {a: pair for a, pair in config.free.items() if a.partition(".")[0] not in law},
-        }
+        config, mesh, parts = self.config, self.config.mesh, self.walker.parts
+        values: dict[str, Any] = {"model.toes": False}
+        rigid = replace(parts, toes=False)
+        if parts.compliant:
+            intervals = mesh.intervals if isinstance(mesh.intervals, int) else sum(mesh.intervals)
+            values |= {"mesh.intervals": intervals, "bounds.phase_durations": {}}
+            values["model.feet"], rigid = "sole", replace(rigid, feet="sole")
+        known = {name for number in rigid.numbers for name in (number.address, number.place)}
+        values["free"] = {a: pair for a, pair in config.free.items() if a in known}
         case = self.case.with_values(values)
         rolling = GaitSolver(case, self.observer, self.stages, self.seconds)
         program, result = rolling._track()
         if self._interrupted:
             raise KeyboardInterrupt
-        motion = sunk(self.walker, program.to_motion(result.unknowns))
+        motion = self._on_own_feet(program.to_motion(result.unknowns))
         motion = replace(motion, parameters=self.parameter_guess())
         return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
 

@@ -8,35 +8,11 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SUFFIX
+from pathwalker_cli.conventions import GENERATORS
 from pathwalker_cli.gait import choices
-from pathwalker_cli.model.compliance import depth_under
-from pathwalker_cli.model.contact import TIPS
-from pathwalker_cli.model.elements.toes import toe_joints
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_points
 from pathwalker_cli.trajectory import Trajectory
-
-
-def with_toes(walker: Walker, q: np.ndarray) -> np.ndarray:
-    """Return postures (n, 10) with those of further joints, (n, size).
-
-    Toes are in line with the foot; where that would press them into the ground, they lie on it and
-    are as deep as their joint presses them.
-    """
-    completed = walker.skeleton.completed(q)
-    for joint, tip in zip(toe_joints(), TIPS, strict=True) if walker.parts.toes else ():
-        s, length = SUFFIX[joint.side], walker.patient.toes_length(joint.side)
-        stiffness = walker.values[joint.numbers[0].address]
-        chain = ("pelvis_tilt", *(f"{name}_{s}" for name in LEG_JOINTS))
-        pitch = completed[:, [walker.skeleton.index(name) for name in chain]].sum(axis=1)
-        height = np.array([walker.frames(posture)[f"toe_{s}"][1] for posture in completed])
-        level = np.arcsin(np.clip(height / length, -1.0, 1.0))  # pitch of toes that just touch
-        load = stiffness * np.maximum(pitch - level, 0.0) / length
-        depth = [depth_under(tip, each, walker.values, walker.weight) for each in load]
-        deep = np.arcsin(np.clip((height + depth) / length, -1.0, 1.0))
-        completed[:, walker.skeleton.index(*joint.coordinates)] = np.minimum(deep - pitch, 0.0)
-    return completed
 
 
 @dataclass(frozen=True)

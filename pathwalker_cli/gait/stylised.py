@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from pathwalker_cli.conventions import COORDINATES, GRAVITY, coordinate_unit
+from pathwalker_cli.conventions import GRAVITY, coordinate_unit
 from pathwalker_cli.gait import choices
-from pathwalker_cli.gait.start import ReferenceStride, with_toes
+from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.trajectory import Trajectory
 
@@ -126,8 +126,8 @@ def stylised_trajectory(walker: Walker, gait: StylisedGait, samples: int = 201) 
         q[f"knee_{side}"] = knee
         q[f"ankle_{side}"] = pitch - thigh - knee
     names = walker.skeleton.coordinates
-    values = np.column_stack([np.broadcast_to(q[name], samples) for name in COORDINATES])
-    return Trajectory(time, names, with_toes(walker, values), tuple(map(coordinate_unit, names)))
+    values = np.column_stack([np.broadcast_to(q.get(name, 0.0), samples) for name in names])
+    return Trajectory(time, names, values, tuple(map(coordinate_unit, names)))
 
 
 def _leg(walker: Walker, side: str) -> _Leg:

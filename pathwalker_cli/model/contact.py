@@ -287,6 +287,10 @@ class ContactPattern:
         """Return the positions of some components in `forces`."""
         return [self.forces.index(force) for force in forces]
 
+    def upward(self, points: Sequence[ContactPoint]) -> list[int]:
+        """Return the positions in `forces` of the vertical components of some places."""
+        return [2 * self.points.index(point) + 1 for point in points]
+
     def phase(self, phase: str | int | ContactPhase) -> ContactPhase:
         """Return a phase of such feet; see `phase_named`."""
         if isinstance(phase, ContactPhase):

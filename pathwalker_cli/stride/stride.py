@@ -412,14 +412,15 @@ def centre_of_pressure(series: GaitSeries, side: Side) -> np.ndarray:
 
 
 def body_points(walker: Walker, q: np.ndarray) -> dict[str, np.ndarray]:
-    """Return positions of joints, heels, toes, neck and head (x, z) [m].
+    """Return positions of joints, heels, toes, neck and head (x, z) [m], of toes also their tips.
 
     Args:
         walker: Who walks.
         q: Generalised coordinates, shape (10,).
     """
     frames = walker.frames(q)
-    legs = [f"{name}_{s}" for name in ("hip", "knee", "ankle", "heel", "toe") for s in "rl"]
+    ends = ("hip", "knee", "ankle", "heel", "toe", *(["tip"] if walker.parts.toes else []))
+    legs = [f"{name}_{s}" for name in ends for s in "rl"]
     points = {name: frames[name] for name in (*legs, "lumbar", "head")}
     points["neck"] = points.pop("head")
     points["head"] = points["neck"] + 0.25 * (points["neck"] - points["lumbar"])
