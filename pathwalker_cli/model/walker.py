@@ -31,7 +31,7 @@ from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator
 from pathwalker_cli.model.elements.orthosis import OrthosisSide
 from pathwalker_cli.model.numbers import Number, Unknown
 from pathwalker_cli.model.parts import Parts
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, Side, Skeleton
+from pathwalker_cli.model.skeleton import Side, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 
@@ -162,6 +162,15 @@ class Walker:
         return replace(
             changed, model=model, rigid_body=replace(self.rigid_body, parameters=parameters)
         )
+
+    @cached_property
+    def flat_footed(self) -> Walker:
+        """The walker as recordings know it, whose feet are in one piece."""
+        if not self.parts.toes:
+            return self
+        parts = replace(self.parts, toes=False)
+        walker = walker_of(self.patient, parts, self.published, self.backend)
+        return walker.with_values({n.address: self.values[n.address] for n in parts.numbers})
 
     @property
     def total_mass(self) -> float:
@@ -364,7 +373,7 @@ class Walker:
             Forward and up [m], shape (k, 2): right heel, right toe, left heel, left toe; of soles
             right and left.
         """
-        q, body = self._posture(q), self.rigid_body
+        q, body = _vector(q, self.skeleton.size, "q"), self.rigid_body
         return np.asarray(body.point_positions(q, body.parameters)).reshape(-1, 2)
 
     def foot_points(self, q: Any) -> np.ndarray:
@@ -373,21 +382,11 @@ class Walker:
         return np.array([frames[point.name] for point in POINTS])
 
     def frames(self, q: Any) -> dict[str, np.ndarray]:
-        """Return where all frames are in q: forward, up [m], by name.
-
-        Joints that q leaves out at its end, as recordings do, are at 0.
-        """
+        """Return where all frames are in q: forward, up [m], by name."""
         data = self.model.createData()
-        pin.framesForwardKinematics(self.model, data, self._posture(q))
+        pin.framesForwardKinematics(self.model, data, _vector(q, self.skeleton.size, "q"))
         pairs = zip(self.model.frames, data.oMf, strict=True)
         return {frame.name: place.translation[[0, 2]].copy() for frame, place in pairs}
-
-    def _posture(self, q: Any) -> np.ndarray:
-        """Return all coordinates of a posture, of which q may be those of recordings."""
-        given = np.asarray(q, dtype=float).ravel()
-        if given.size == PLANAR_WALKER.size:
-            given = self.skeleton.completed(given)
-        return _vector(given, self.skeleton.size, "q")
 
     @cached_property
     def contact_motion(self) -> ca.Function:

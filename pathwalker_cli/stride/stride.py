@@ -45,8 +45,7 @@ class Stride(Sampled):
         name: What to call it: the folder of a run, or the recorded trial.
         walker: Who walks: mass and weight with what is worn, and leg length.
         time: Instants from 0 on [s], never decreasing, shape (n,).
-        q: Generalised coordinates [m, rad], shape (n, 10), of further joints too where they are
-            known.
+        q: Generalised coordinates [m, rad], shape (n, 10).
         stances: Per side, its foot strike and the toe-off that ends this stance [s]; later than
             the end where the stance goes on at the beginning of the stride.
         problem: The problem that it solves, e.g. "mapd-orthosis"; "" for a recorded one.
@@ -97,9 +96,7 @@ class Stride(Sampled):
     def __post_init__(self) -> None:
         """Check the shapes."""
         n, columns = self.time.size, {"muscle_torque": len(GENERATORS), "orthosis_torque": 2}
-        recorded, all_joints = len(COORDINATES), self.walker.skeleton.size
-        width = recorded if self.q.shape[1:] == (recorded,) else all_joints
-        columns |= dict.fromkeys(("q", "v", "net_torque"), width)
+        columns |= dict.fromkeys(("q", "v", "net_torque"), self.walker.skeleton.size)
         pattern = self.walker.pattern
         columns |= {"activation": len(GENERATORS), "point_force": len(pattern.forces)}
         checked = [(name, getattr(self, name), width) for name, width in columns.items()]
