@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -42,7 +42,8 @@ from pathwalker_cli.gait.solution import (
 from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.gait.stylised import stylised_stride
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
-from pathwalker_cli.gait.typical import TypicalWalk, completed, typical_walks
+from pathwalker_cli.gait.toes import with_toes
+from pathwalker_cli.gait.typical import TypicalWalk, typical_walks
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
 from pathwalker_cli.nlp.watch import ProgressReport
@@ -217,9 +218,29 @@ class GaitSolver:
             settings = self.settings(tolerance, solver.warm_barrier)
             stage = self._on_first_mesh(self._warm_motion(warm_start), settings)
         else:
-            start, stage = self._from_typical_walk(tolerance) or self._from_stride(tolerance)
+            start, stage = self._from_the_start(tolerance)
         program, result, errors = self._refine(*stage, tolerance)
         return self._finish(program, result, errors, start)
+
+    def _from_the_start(self, tolerance: float) -> tuple[str, Stage]:
+        """Predict on the first mesh as the config's start says; with toes, from a walk without.
+
+        Raises:
+            KeyboardInterrupt: If the user stops it: there is no iterate of this problem yet.
+        """
+        if not self.walker.parts.toes:
+            return self._from_typical_walk(tolerance) or self._from_stride(tolerance)
+        known = self.walker.flat_footed.parts.numbers
+        names = {name for number in known for name in (number.address, number.place)}
+        free = {address: pair for address, pair in self.config.free.items() if address in names}
+        case = self.case.with_values({"model.toes": False, "free": free})
+        flat = GaitSolver(case, self.observer, self.stages, self.seconds)
+        start, (program, result) = flat._from_the_start(tolerance)
+        if self._interrupted:
+            raise KeyboardInterrupt
+        found = program.to_motion(result.unknowns)
+        motion = replace(with_toes(self.walker, found), parameters=self.parameter_guess())
+        return start, self._on_first_mesh(motion, self.settings(tolerance, choices.TYPICAL_BARRIER))
 
     def _from_typical_walk(self, tolerance: float) -> tuple[str, Stage] | None:
         """Predict on the first mesh from the typical walk of the most similar child.
@@ -242,22 +263,18 @@ class GaitSolver:
 
     def _typical_motion(self, walk: TypicalWalk) -> PhasedMotion:
         """Return a typical walk on the first mesh, scaled to the walker."""
-        scaled, mesh = walk.scaled(self.walker, self.parameter_guess()), self.config.mesh
-        motion = self._on_own_feet(scaled)
+        motion, mesh = walk.scaled(self.walker, self.parameter_guess()), self.config.mesh
+        if self.walker.parts.compliant:
+            motion = sunk(self.walker, motion)
         motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])
         motion = with_goal_costs(motion, self.gait.costs, self.walker)
         return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
 
-    def _on_own_feet(self, motion: PhasedMotion) -> PhasedMotion:
-        """Return a motion on rigid feet on those of the walker."""
-        motion = completed(self.walker, motion, self.bounds.table)
-        return sunk(self.walker, motion) if self.walker.parts.compliant else motion
-
     def _from_stride(self, tolerance: float) -> tuple[str, Stage]:
         """Predict on the first mesh from the config's stride, which is tracked first."""
         settings = self.settings(tolerance, self.config.solver.first_barrier)
-        if self.walker.parts.compliant or self.walker.parts.toes:
-            return self.stride.name, self._on_first_mesh(self._tracked_on_rigid_feet(), settings)
+        if self.walker.parts.compliant:
+            return self.stride.name, self._on_first_mesh(self._tracked_on_soles(), settings)
         program, result = self._track()
         if not self._interrupted:
             motion = program.to_motion(result.unknowns)
@@ -318,27 +335,27 @@ class GaitSolver:
         motion = program.to_motion(result.unknowns)
         return full_stride(self.walker.parts, motion) if self.config.half_cycle else motion
 
-    def _tracked_on_rigid_feet(self) -> PhasedMotion:
-        """Follow the stride of the start on feet that do not give way; return it on those that do.
+    def _tracked_on_soles(self) -> PhasedMotion:
+        """Follow the stride of the start on soles that roll; return it sunk into the ground.
 
         Raises:
             KeyboardInterrupt: If the user stops it: there is no iterate of this problem yet.
         """
-        config, mesh, parts = self.config, self.config.mesh, self.walker.parts
-        values: dict[str, Any] = {"model.toes": False}
-        rigid = replace(parts, toes=False)
-        if parts.compliant:
-            intervals = mesh.intervals if isinstance(mesh.intervals, int) else sum(mesh.intervals)
-            values |= {"mesh.intervals": intervals, "bounds.phase_durations": {}}
-            values["model.feet"], rigid = "sole", replace(rigid, feet="sole")
-        known = {name for number in rigid.numbers for name in (number.address, number.place)}
-        values["free"] = {a: pair for a, pair in config.free.items() if a in known}
+        config, mesh = self.config, self.config.mesh
+        law = {n.place for point in self.walker.pattern.points for n in point.law}
+        intervals = mesh.intervals if isinstance(mesh.intervals, int) else sum(mesh.intervals)
+        values = {
+            "model.feet": "sole",
+            "mesh.intervals": intervals,
+            "bounds.phase_durations": {},
+            "free": {a: pair for a, pair in config.free.items() if a.partition(".")[0] not in law},
+        }
         case = self.case.with_values(values)
         rolling = GaitSolver(case, self.observer, self.stages, self.seconds)
         program, result = rolling._track()
         if self._interrupted:
             raise KeyboardInterrupt
-        motion = self._on_own_feet(program.to_motion(result.unknowns))
+        motion = sunk(self.walker, program.to_motion(result.unknowns))
         motion = replace(motion, parameters=self.parameter_guess())
         return motion.resampled(meshing.first(motion.durations, mesh), mesh.degree)
 

@@ -16,15 +16,12 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, LEG_JOINTS, ROOT, SUFFIX
+from pathwalker_cli.conventions import COORDINATES, ROOT
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.motion_file import read_arrays, read_motion
-from pathwalker_cli.model.compliance import depth_under
-from pathwalker_cli.model.contact import TIPS, Feet, contact_pattern
-from pathwalker_cli.model.elements.toes import toe_joints
+from pathwalker_cli.model.contact import Feet, contact_pattern
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
-from pathwalker_cli.ocp.problem import BoundTable
 from pathwalker_cli.paths import shipped
 
 
@@ -99,62 +96,6 @@ def typical_walks(walker: Walker) -> list[TypicalWalk]:
     walks = (TypicalWalk.read(path) for path in paths)
     fitting = [walk for walk in walks if walk.phases == phases]
     return sorted(fitting, key=lambda walk: walk.distance(walker))
-
-
-def completed(walker: Walker, motion: PhasedMotion, table: BoundTable) -> PhasedMotion:
-    """Return a motion of ten coordinates with the toes of a walker, if a joint carries them.
-
-    Postures are first brought within their bounds: toes that stand on the ground then stay there.
-    """
-    if not walker.parts.toes:
-        return motion
-    n, more = len(COORDINATES), walker.skeleton.size - len(COORDINATES)
-    lower, upper = table.arrays(COORDINATES)
-
-    def states(given: np.ndarray) -> np.ndarray:
-        q, v = np.split(given.reshape(-1, 2 * n), 2, axis=1)
-        q = _with_toes(walker, np.clip(q, lower, upper))
-        return np.hstack([q, walker.skeleton.completed(v)]).reshape(*given.shape[:-1], -1)
-
-    def algebraic(given: np.ndarray) -> np.ndarray:
-        parts = np.split(given, [n, given.shape[-1] - n], axis=-1)
-        pairs = zip(parts, (more, 2 * len(TIPS), more), strict=True)
-        padded = [np.pad(part, [(0, 0), (0, 0), (0, width)]) for part, width in pairs]
-        return np.concatenate(padded, axis=-1)
-
-    return replace(
-        motion,
-        phases=tuple(
-            replace(
-                phase,
-                states=states(phase.states),
-                inner_states=states(phase.inner_states),
-                algebraic=algebraic(phase.algebraic),
-            )
-            for phase in motion.phases
-        ),
-    )
-
-
-def _with_toes(walker: Walker, q: np.ndarray) -> np.ndarray:
-    """Return postures (n, 10) with those of further joints, (n, size).
-
-    Toes are in line with the foot; where that would press them into the ground, they lie on it and
-    are as deep as their joint presses them.
-    """
-    completed = walker.skeleton.completed(q)
-    for joint, tip in zip(toe_joints(), TIPS, strict=True) if walker.parts.toes else ():
-        s, length = SUFFIX[joint.side], walker.patient.toes_length(joint.side)
-        stiffness = walker.values[joint.numbers[0].address]
-        chain = ("pelvis_tilt", *(f"{name}_{s}" for name in LEG_JOINTS))
-        pitch = completed[:, [walker.skeleton.index(name) for name in chain]].sum(axis=1)
-        height = np.array([walker.frames(posture)[f"toe_{s}"][1] for posture in completed])
-        level = np.arcsin(np.clip(height / length, -1.0, 1.0))  # pitch of toes that just touch
-        load = stiffness * np.maximum(pitch - level, 0.0) / length
-        depth = [depth_under(tip, each, walker.values, walker.weight) for each in load]
-        deep = np.arcsin(np.clip((height + depth) / length, -1.0, 1.0))
-        completed[:, walker.skeleton.index(*joint.coordinates)] = np.minimum(deep - pitch, 0.0)
-    return completed
 
 
 _TRANSLATIONS: Final = np.array([name in ROOT[:2] for name in COORDINATES])
