@@ -28,7 +28,7 @@ from pathwalker_cli.patient import load_patient
 from pathwalker_cli.stride.balance import balance
 from pathwalker_cli.stride.figures.save import figure_names, make_figure
 from pathwalker_cli.stride.series import GaitSeries, gait_series
-from pathwalker_cli.stride.stride import body_points, stride_of
+from pathwalker_cli.stride.stride import body_points, phase_stances, stances_of, stride_of
 from pathwalker_cli.stride.verify import second_engine_residual
 
 PATIENT = load_patient("sreenivasa2017-patient")
@@ -225,6 +225,21 @@ def test_toes_are_drawn_exported_and_measured() -> None:
         assert f'name="{name}"' in text
     assert asymmetries(series.walker) == asymmetries(build_walker(PATIENT))
     assert stride_of(series).q.shape[1] == ALL
+
+
+def test_a_foot_is_off_the_ground_when_its_toes_are() -> None:
+    series = made_series()
+    pattern, force = series.walker.pattern, np.zeros_like(series.force)
+    off = phase_stances(pattern, series.motion.durations)["right"][1]
+    tip, later = pattern.upward(TIPS)[0], (series.time - off) % series.duration
+    force[:, tip] = np.where(later < 0.1, 40.0 * (1.0 - later / 0.1), 0.0)  # 20 N after 0.05 s
+    pushing = replace(series, force=force)
+    assert stances_of(pushing)["right"][1] - off == pytest.approx(0.05, abs=0.03)
+    assert stances_of(replace(series, force=0.0 * force))["right"][1] == pytest.approx(off)
+    stride = stride_of(pushing)
+    rows = (later > 0.0) & (later < 0.04)
+    assert stride.stands("right")[rows].all()
+    assert stride.contacts[:, pattern.points.index(TIPS[0])].sum() == np.sum(force[:, tip] > 20.0)
 
 
 def test_a_walk_is_given_toes_that_lie_on_the_ground(tmp_path: Path) -> None:

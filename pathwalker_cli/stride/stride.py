@@ -314,13 +314,17 @@ def phase_stances(
 def stances_of(series: GaitSeries) -> dict[Side, tuple[float, float]]:
     """Return foot strike and toe-off of each side [s]; of what gives way, from its load.
 
-    Toe-off is then the end of the side's own step, and the strike where the load that lasts until
-    toe-off passes `LOADED`.
+    Toe-off of compliant soles is the end of the side's own step, and the strike where the load that
+    lasts until toe-off passes `LOADED`.  Toes that a joint carries push on when the ball has left
+    the ground: they are off where they bear less than that.
     """
     pattern = series.walker.pattern
     switching = switching_times(pattern, series.motion)
     if not series.walker.parts.compliant:
-        return phase_stances(pattern, np.diff(switching))
+        spans = phase_stances(pattern, np.diff(switching))
+        if not series.walker.parts.toes:
+            return spans
+        return {side: (on, _unloaded(series, side, off)) for side, (on, off) in spans.items()}
     duration, found = series.duration, {}
     for side, toe_off in zip(SIDES, switching[1:].tolist(), strict=True):
         since = (series.time - toe_off) % duration
@@ -335,6 +339,14 @@ def stances_of(series: GaitSeries) -> dict[Side, tuple[float, float]]:
             strike = (toe_off + begin + share * (end - begin)) % duration
         found[side] = strike, toe_off if toe_off > strike else toe_off + duration
     return found
+
+
+def _unloaded(series: GaitSeries, side: Side, since: float) -> float:
+    """Return the first instant from another one on at which a foot bears less than `LOADED` [s]."""
+    later = (series.time - since) % series.duration
+    order = np.argsort(later, kind="stable")
+    light = series.vertical_force(side)[order] < LOADED
+    return since + float(later[order][int(np.argmax(light))])
 
 
 @dataclass(frozen=True)
@@ -377,10 +389,12 @@ def contacts(walker: Walker, phase: tuple[str, ...], force: np.ndarray | None) -
         phase: Name of the phase at each instant.
         force: Forces in the order of the pattern [N], shape (n, 2 k); needed of what gives way.
     """
-    if walker.parts.compliant and force is not None:
-        return np.asarray(force[:, 1::2] > LOADED)
-    points = {name: phase_named(name).points for name in set(phase)}
-    return np.array([[point in points[name] for point in walker.pattern.points] for name in phase])
+    pattern, points = walker.pattern, {name: phase_named(name).points for name in set(phase)}
+    on = np.array([[point in points[name] for point in pattern.points] for name in phase])
+    if force is not None and pattern.yielding:
+        soft = [pattern.points.index(point) for point in pattern.yielding]
+        on[:, soft] = force[:, pattern.upward(pattern.yielding)] > LOADED
+    return on
 
 
 def toe_bearing(stride: Stride, side: Side) -> np.ndarray:
