@@ -269,7 +269,11 @@ def test_a_walk_is_given_toes_that_lie_on_the_ground(tmp_path: Path) -> None:
     ("name", "values", "sentence"),
     [
         ("mapd-orthosis", {}, "gives toes to feet with orthoses, whose soles are one plate"),
-        ("mapd-barefoot", {"transcription": "shooting"}, "shooting of feet with toes, too quick"),
+        (
+            "mapd-barefoot",
+            {"transcription": "multiple-shooting"},
+            "shooting of feet with toes, too quick",
+        ),
     ],
 )
 def test_what_feet_with_toes_cannot_is_refused(
