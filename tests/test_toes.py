@@ -26,6 +26,7 @@ from pathwalker_cli.model.skeleton import PLANAR_WALKER, TOED_WALKER
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.stride.balance import balance
+from pathwalker_cli.stride.figures.curves import TOES
 from pathwalker_cli.stride.figures.save import figure_names, make_figure
 from pathwalker_cli.stride.series import GaitSeries, gait_series
 from pathwalker_cli.stride.stride import body_points, phase_stances, stances_of, stride_of
@@ -216,7 +217,9 @@ def test_toes_are_drawn_exported_and_measured() -> None:
     series = made_series()
     assert "toe_joints" in figure_names(series)
     assert "orthosis_curves" not in figure_names(series)
-    assert len(make_figure("toe_joints", series).axes) == 3
+    assert len(make_figure("toe_joints", series).axes) == 4
+    right = TOES.columns(stride_of(series), "right")[:, 0]
+    assert right == pytest.approx(-np.rad2deg(series.column("mtp_r")))
     points = body_points(series.walker, np.zeros(ALL))
     reach = points["tip_r"] - points["toe_r"]
     assert reach == pytest.approx([series.walker.patient.toes_length("right"), 0.0], abs=1e-9)

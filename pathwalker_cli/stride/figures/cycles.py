@@ -105,8 +105,8 @@ def toe_joints(series: GaitSeries, reference: Reference | None = None) -> Figure
     walker = series.walker
     if not walker.parts.toes:
         raise InputError("these feet have no toe joints", allowed="model.toes true")
-    fig = style.new_figure(2.1)
-    panels = fig.subplots(1, 3)
+    fig = style.new_figure(2.9)
+    panels = fig.subplots(2, 2).ravel()
     tips = dict(zip(SIDES, series.force[:, walker.pattern.upward(TIPS)].T, strict=True))
     for side in SIDES:
         toe = f"mtp_{SUFFIX[side]}"
@@ -115,14 +115,14 @@ def toe_joints(series: GaitSeries, reference: Reference | None = None) -> Figure
         _draw_side(panels[1], series, side, torque / walker.total_mass)
         _draw_side(panels[2], series, side, 100.0 * tips[side] / walker.weight)
     titles = {"Toes, extension +": "extension [deg]", "Toe joint, flexing +": "moment [N m/kg]",
-              "Tips of the toes": "vertical force [% body weight]"}  # fmt: skip
-    for ax, (title, label) in zip(panels, titles.items(), strict=True):
+              "Tips of the toes": "force [% body weight]"}  # fmt: skip
+    for ax, (title, label) in zip(panels, titles.items(), strict=False):
         style.dress(ax, title, y=label)
         style.zero_line(ax)
         for side in SIDES:
             style.toe_off_line(ax, own_cycle(series, side))
         style.percent_axis(ax)
-    style.legend(fig, [*style.side_handles(), style.events_handle()])
+    style.legend_panel(panels[-1], [*style.side_handles(), style.events_handle()])
     return fig
 
 
