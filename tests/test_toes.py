@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from figure_measure import complaints
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import load_config, with_values
 from pathwalker_cli.conventions import SIDES, SUFFIX
@@ -217,7 +218,13 @@ def test_toes_are_drawn_exported_and_measured() -> None:
     series = made_series()
     assert "toe_joints" in figure_names(series)
     assert "orthosis_curves" not in figure_names(series)
-    assert len(make_figure("toe_joints", series).axes) == 4
+    figure = make_figure("toe_joints", series)
+    assert complaints(figure) == []
+    shown = [ax for ax in figure.axes if ax.axison]
+    assert [len({line.get_linestyle() for line in ax.get_lines()}) >= 2 for ax in shown] == [
+        True
+    ] * 3
+    assert all("[" in ax.get_ylabel() for ax in shown)
     right = TOES.columns(stride_of(series), "right")[:, 0]
     assert right == pytest.approx(-np.rad2deg(series.column("mtp_r")))
     points = body_points(series.walker, np.zeros(ALL))
