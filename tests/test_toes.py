@@ -293,6 +293,15 @@ def test_what_feet_with_toes_cannot_is_refused(
         with_values(load_config(name), {"model.toes": True, **values})
 
 
+def test_ranges_of_toes_want_toes() -> None:
+    ranges = {"bounds.joint_ranges": {"mtp_r": (-1.0, 0.2)}}
+    with pytest.raises(ConfigError, match="bounds mtp_r of toes that no joint carries"):
+        with_values(load_config("mapd-barefoot"), ranges)
+    bounds = toed_solver(**ranges).bounds
+    assert bounds.table.entries[("mtp_r",)] == (-1.0, 0.2)
+    assert bounds.table.entries[("mtp_l",)] == (-1.2, 0.6)
+
+
 def test_a_toe_point_in_front_of_the_ball_is_refused() -> None:
     with pytest.raises(PatientError, match="too far in front of the foot r to be the ball"):
         build_walker(load_patient("sreenivasa2017-healthy"), toes=True)

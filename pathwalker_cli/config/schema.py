@@ -375,6 +375,11 @@ class StudyConfig(YamlModel):
                 "weighs the goal 'centre_of_pressure', which needs heel and toe: a sole rolls",
                 mend="leave the goal out, or set model.feet to points or rockers",
             )
+        if not self.model.toes and (toes := self.bounds.joint_ranges.keys() - set(ANGLES)):
+            raise invalid(
+                f"bounds {min(toes)} of toes that no joint carries",
+                mend="set model.toes to true, or leave it out of bounds.joint_ranges",
+            )
         if self.model.toes and self.condition == "orthosis":
             raise invalid(
                 "gives toes to feet with orthoses, whose soles are one plate",

@@ -12,6 +12,7 @@ import numpy as np
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import MeshConfig, StudyConfig
+from pathwalker_cli.conventions import COORDINATES
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
@@ -233,7 +234,10 @@ class GaitSolver:
         known = self.walker.flat_footed.parts.numbers
         names = {name for number in known for name in (number.address, number.place)}
         free = {address: pair for address, pair in self.config.free.items() if address in names}
-        case = self.case.with_values({"model.toes": False, "free": free})
+        given = self.config.bounds.joint_ranges.items()
+        ranges = {name: pair for name, pair in given if name in COORDINATES}
+        values = {"model.toes": False, "free": free, "bounds.joint_ranges": ranges}
+        case = self.case.with_values(values)
         flat = GaitSolver(case, self.observer, self.stages, self.seconds)
         start, (program, result) = flat._from_the_start(tolerance)
         if self._interrupted:
