@@ -20,7 +20,9 @@ GRAVITY: Final = 9.81
 """Gravitational acceleration [m/s^2]."""
 
 COORDINATES: Final = PLANAR_WALKER.coordinates
-"""Generalised coordinates in order: two translations [m], eight angles [rad]."""
+"""Generalised coordinates of recordings in order: two translations [m], eight angles [rad].
+
+Those of a walker are in its skeleton: these ten, and whatever joints it has besides behind them."""
 
 ANGLES: Final = PLANAR_WALKER.angles
 TRANSLATIONS: Final = PLANAR_WALKER.translations

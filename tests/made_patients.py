@@ -21,8 +21,9 @@ from pathwalker_cli.conventions import (
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.costs import Costs
-from pathwalker_cli.gait.problem import VELOCITIES, GaitProblem
+from pathwalker_cli.gait.problem import GaitProblem
 from pathwalker_cli.model.contact import PHASES
+from pathwalker_cli.model.skeleton import PLANAR_WALKER
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
@@ -225,7 +226,7 @@ def random_step(seed: int) -> PhasedMotion:
     half, count = len(PHASES) // 2, len(PHASES) // 2 * INTERVALS
     n, m = len(COORDINATES), len(GENERATORS)
     states = rng.normal(size=(count + 1, 2 * n)) * np.repeat([0.4, 2.0], n)
-    states[-1] = states[0][mirror_permutation(COORDINATES + VELOCITIES)]
+    states[-1] = states[0][mirror_permutation(COORDINATES + PLANAR_WALKER.named("velocity"))]
     states[-1, 0] += 0.3 + rng.random()
     smooth, controls = rng.random((count + 1, m)), 5.0 * rng.normal(size=(count + 1, m))
     for values in (smooth, controls):

@@ -300,7 +300,7 @@ def test_a_symmetric_walk_on_soles_is_one_step_twice() -> None:
     assert solution.converged
     motion = solution.last_motion
     assert [p.name for p in motion.phases] == list(solution.walker.pattern.names)
-    again = full_stride(type(motion)(motion.phases[:2], motion.parameters))
+    again = full_stride(Parts(), type(motion)(motion.phases[:2], motion.parameters))
     assert again.phases[2].states == pytest.approx(motion.phases[2].states)
     assert stride_of(gait_series(solution.walker, motion)).step_length("right") > 0.0
 

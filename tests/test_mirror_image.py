@@ -10,10 +10,11 @@ import pytest
 from made_patients import mirror_image
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import load_config, smoke_version, with_values
-from pathwalker_cli.conventions import COORDINATES, STIFFNESSES, mirror_permutation, mirrored
-from pathwalker_cli.gait.problem import ACCELERATIONS, ACTIVATIONS, RATES, RESERVES, VELOCITIES
+from pathwalker_cli.conventions import STIFFNESSES, mirror_permutation, mirrored
+from pathwalker_cli.gait.problem import ACTIVATIONS, RATES, algebraic_names
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.contact import PHASES
+from pathwalker_cli.model.skeleton import PLANAR_WALKER
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.patient import Patient, load_patient
@@ -40,9 +41,9 @@ def image_of(stride: PhasedMotion) -> PhasedMotion:
 def turned(phase: PhaseMotion, i: int, shift: float, costs: np.ndarray) -> PhaseMotion:
     """Return phase i with left and right exchanged, elsewhere."""
     here, there = PHASES[i], PHASES[(i + HALF) % len(PHASES)]
-    names = ACCELERATIONS + here.force_names + RESERVES
-    order = [names.index(mirrored(n)) for n in ACCELERATIONS + there.force_names + RESERVES]
-    of_states = mirror_permutation(COORDINATES + VELOCITIES)
+    names, others = (algebraic_names(PLANAR_WALKER, contact) for contact in (here, there))
+    order = [names.index(mirrored(name)) for name in others]
+    of_states = mirror_permutation(PLANAR_WALKER.coordinates + PLANAR_WALKER.named("velocity"))
     states, inner = phase.states[:, of_states], phase.inner_states[..., of_states]
     states[:, 0] += shift
     inner[..., 0] += shift

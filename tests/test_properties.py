@@ -70,6 +70,7 @@ from pathwalker_cli.model.elements.muscle import (
     excitation_from_rate,
 )
 from pathwalker_cli.model.elements.orthosis import OrthosisSide, orthosis_curve, orthosis_torque
+from pathwalker_cli.model.parts import Parts
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 from pathwalker_cli.patient import Patient, load_patient
@@ -176,7 +177,7 @@ def across(place: tuple[str, str]) -> tuple[str, str]:
 @given(patient=patients(), seed=SEEDS)
 def test_rows_of_a_mirrored_motion_are_mirrored(patient: Patient, seed: int) -> None:
     """The second step of a stride is to a patient what the first is to the mirror image."""
-    stride = full_stride(random_step(seed))
+    stride = full_stride(Parts(), random_step(seed))
     swapped = stride.parameters[mirror_permutation(STIFFNESSES)]
     image = build_walker(mirror_image(patient), "orthosis")
     walker = build_walker(patient, "orthosis")
@@ -374,7 +375,7 @@ def test_a_config_comes_back_from_the_one_of_its_run(
 
 @given(seed=SEEDS)
 def test_a_motion_comes_back_bit_by_bit(seed: int) -> None:
-    motion = full_stride(random_step(seed))
+    motion = full_stride(Parts(), random_step(seed))
     file = folder() / "motion.npz"
     write_motion(file, motion)
     again = read_motion(file)

@@ -13,7 +13,7 @@ import pytest
 
 from helpers import STIFFNESS
 from pathwalker_cli.case import config_text
-from pathwalker_cli.config import load_config
+from pathwalker_cli.config import load_config, with_values
 from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import DataError, NotConvergedError
 from pathwalker_cli.gait.motion_file import read_motion, write_motion
@@ -315,6 +315,17 @@ def test_a_run_of_another_condition_is_no_warm_start(run: Path) -> None:
     assert "free parameters" in message
     assert "a run of the barefoot condition" in message
     assert warm_start_run(run, load_config("mapd-orthosis")).folder == run
+
+
+def test_a_run_without_toes_is_no_warm_start_with_them(
+    tmp_path: Path, made_solution: MadeSolution
+) -> None:
+    write_run(tmp_path / "run", made_solution("mapd-barefoot"))
+    config = load_config("mapd-barefoot")
+    toed = with_values(config, {"model.toes": True})
+    message = refusal(lambda: warm_start_run(tmp_path / "run", toed))
+    assert "is a run of feet without toes" in message
+    assert warm_start_run(tmp_path / "run", config).config.model.toes is False
 
 
 def test_a_barefoot_run_has_no_stiffness(tmp_path: Path, made_solution: MadeSolution) -> None:

@@ -22,6 +22,7 @@ from pathwalker_cli.gait.solution import (
     missing_torques,
 )
 from pathwalker_cli.gait.solve import GaitSolver
+from pathwalker_cli.model.skeleton import PLANAR_WALKER
 from pathwalker_cli.results.text import failure_text, shortfall_text
 
 
@@ -44,7 +45,7 @@ def test_help_counts_for_the_muscle_that_pulls_its_way_and_small_help_does_not()
 def test_joints_are_helped_and_the_pelvis_is_not() -> None:
     config = load_config("mapd-barefoot")
     bounds = gait_bounds(walker_of("barefoot"), config.bounds)
-    table = helped_bounds(bounds)
+    table = helped_bounds(PLANAR_WALKER, bounds)
     free = [name for name in COORDINATES if table.entries[(f"{name}_reserve",)] != (0.0, 0.0)]
     assert free == list(COORDINATES[3:])
     other = {key: pair for key, pair in table.entries.items() if "_reserve" not in key[0]}

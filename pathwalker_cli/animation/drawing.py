@@ -42,6 +42,9 @@ _COILS: Final = 5
 _COIL_WIDTH: Final = 0.024
 """Zigzags of a drawn spring and their width [m]."""
 
+_TOES: Final = 0.012
+"""Thickness of toes at the ball of the foot [m]."""
+
 _DOT: Final = 0.009
 """Radius of a marker: a little more than those that are worn [m]."""
 
@@ -167,6 +170,9 @@ def _leg(points: Mapping[str, np.ndarray], side: Side, with_orthosis: bool) -> t
     chain = ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}")
     bones = [Shape("leg", a, b, _LINE, side=side) for a, b in pairwise(chain)]
     foot = Shape("foot", f"heel_{s}", f"toe_{s}", _foot(points, s), closed=True, side=side)
+    if f"tip_{s}" in points:
+        wedge = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, _TOES]])
+        bones.append(Shape("foot", f"toe_{s}", f"tip_{s}", wedge, closed=True, side=side))
     shank, sole = _shells()
     orthosis = (
         Shape("shell", f"knee_{s}", f"ankle_{s}", shank, closed=True, side=side),

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from pinocchio.visualize import MeshcatVisualizer
 
-from pathwalker_cli.conventions import COORDINATES, SIDES, SUFFIX, Side
+from pathwalker_cli.conventions import SIDES, SUFFIX, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.stride.series import GaitSeries
@@ -85,7 +85,7 @@ _Part = tuple[str, str, coal.CollisionGeometry, pin.SE3, np.ndarray]
 
 def _parts(walker: Walker) -> Iterator[_Part]:
     """Yield name, joint, shape, place on the joint and colour of everything that is drawn."""
-    points = body_points(walker, np.zeros(len(COORDINATES)))
+    points = body_points(walker, np.zeros(walker.skeleton.size))
     for side in SIDES:
         yield from _leg(points, side, side in walker.device.elements)
     dark = _grey(_SHADES["right"])
@@ -116,6 +116,9 @@ def _leg(points: dict[str, np.ndarray], side: Side, with_orthosis: bool) -> Iter
     ]
     if with_orthosis:
         lines.append(("shell", "knee", 0.54 * ankle, 0.86 * ankle, _SHELL, _BLUE))
+    if f"tip_{s}" in points:
+        toes = _between(points, f"toe_{s}", f"tip_{s}")
+        lines.append(("toes", "mtp", up, toes + up, _FOOT, colour))
     for name, joint, start, end, radius, shade in lines:
         shape, place = _capsule(start + across, end + across, radius)
         yield f"{name}_{s}", f"{joint}_{s}", shape, place, shade

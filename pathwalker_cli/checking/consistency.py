@@ -150,13 +150,13 @@ def _distance(solver: GaitSolver) -> Iterator[ConfigError]:
 def _flat_feet(solver: GaitSolver) -> Iterator[ConfigError]:
     """Yield an error for each foot that joint ranges let stand flat nowhere."""
     table = solver.bounds.table.entries
-    base = np.zeros(len(COORDINATES))
+    base = np.zeros(solver.walker.skeleton.size)
     for side in SIDES:
         pitch = _pitch(solver, base, side)
         names, slopes = [], []
         for name in _ANGLES:
             moved = base.copy()
-            moved[COORDINATES.index(name)] = 0.1
+            moved[solver.walker.skeleton.index(name)] = 0.1
             slope = round((_pitch(solver, moved, side) - pitch) / 0.1)
             if slope:
                 names.append(name)

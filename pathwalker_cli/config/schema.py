@@ -35,6 +35,7 @@ from pathwalker_cli.model.contact import (
     Use,
     contact_pattern,
 )
+from pathwalker_cli.model.skeleton import TOED_WALKER
 from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.patient.variation import Variation
 from pathwalker_cli.problems import PROBLEMS
@@ -87,6 +88,7 @@ def _keys_of(allowed: Collection[str], elsewhere: Collection[str] = ()) -> After
 
 
 RangeByAngle = Annotated[dict[str, Range], _keys_of(ANGLES)]
+RangeByJoint = Annotated[dict[str, Range], _keys_of(TOED_WALKER.angles)]
 
 
 # names of trials that look like numbers are names
@@ -141,6 +143,7 @@ class ModelConfig(YamlModel):
     tissue: bool = False
     elements: Annotated[tuple[str, ...], AS_TUPLE] = ()
     feet: Feet = "points"
+    toes: bool = False
     contact: Sides[FootUse] = Sides[FootUse](right=HEEL_TOE[0], left=HEEL_TOE[1])
 
     @property
@@ -151,7 +154,7 @@ class ModelConfig(YamlModel):
     @property
     def pattern(self) -> ContactPattern:
         """The phases of a stride."""
-        return contact_pattern(self.feet, self.uses)
+        return contact_pattern(self.feet, self.uses, self.toes)
 
     @model_validator(mode="after")
     def _rolling(self) -> ModelConfig:
@@ -218,7 +221,7 @@ class BoundsConfig(YamlModel):
     """Bounds of the prediction; they decide the answer as much as the cost does."""
 
     joint_range_margin: Annotated[float, Quantity("rad", 0.0, 1.5, above="is it in degrees?")] = 0.2
-    joint_ranges: RangeByAngle = Field(default_factory=dict)
+    joint_ranges: RangeByJoint = Field(default_factory=dict)
     fallback_joint_ranges: RangeByAngle = Field(
         default_factory=lambda: {
             "pelvis_tilt": (-0.5, 0.4),
@@ -371,6 +374,21 @@ class StudyConfig(YamlModel):
             raise invalid(
                 "weighs the goal 'centre_of_pressure', which needs heel and toe: a sole rolls",
                 mend="leave the goal out, or set model.feet to points or rockers",
+            )
+        if not self.model.toes and (toes := self.bounds.joint_ranges.keys() - set(ANGLES)):
+            raise invalid(
+                f"bounds {min(toes)} of toes that no joint carries",
+                mend="set model.toes to true, or leave it out of bounds.joint_ranges",
+            )
+        if self.model.toes and self.condition == "orthosis":
+            raise invalid(
+                "gives toes to feet with orthoses, whose soles are one plate",
+                mend="set model.toes to false, or solve a barefoot problem",
+            )
+        if self.model.toes and self.transcription != "collocation":
+            raise invalid(
+                f"asks for {self.transcription} of feet with toes, too quick for its steps",
+                mend="set transcription to collocation, or model.toes to false",
             )
         if self.model.feet == "compliant":
             if self.fits:

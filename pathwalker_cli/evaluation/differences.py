@@ -65,10 +65,11 @@ def rms_one_trial(stride: Stride, reference: Stride) -> dict[str, float]:
     interpolated.  The recorded stride comes from `recorded.reference_stride`.
     """
     at, time = reference.time[:-_CUT], stride.time
+    known = stride.q[:, : len(COORDINATES)]
     if np.diff(time).max() <= _DENSE:
-        q = stride.q[np.abs(time[:, None] - at).argmin(axis=0)]
+        q = known[np.abs(time[:, None] - at).argmin(axis=0)]
     else:
-        q = np.stack([np.interp(at, time, column) for column in stride.q.T], axis=1)
+        q = np.stack([np.interp(at, time, column) for column in known.T], axis=1)
     difference = q - reference.q[:-_CUT]
     return {
         joint: _rms(difference[:, [COORDINATES.index(name) for name in names]])
@@ -92,7 +93,8 @@ def rms_mean_cycle(stride: Stride, recorded: RecordedGait) -> dict[str, float]:
     errors: dict[str, list[np.ndarray]] = {}
     for side in sides_shown(stride):
         cycles = [cycle.over_cycle(cycle.q, side) for cycle in recorded.of("stride", side)]
-        difference = stride.over_cycle(stride.q, side) - np.mean(cycles, axis=0)
+        known = stride.q[:, : len(COORDINATES)]
+        difference = stride.over_cycle(known, side) - np.mean(cycles, axis=0)
         for joint, names in JOINTS.items():
             for name in names:
                 if len(names) == 1 or name.endswith(f"_{SUFFIX[side]}"):

@@ -14,10 +14,11 @@ import numpy as np
 from pathwalker_cli.conventions import GRAVITY, ROOT, SUFFIX
 from pathwalker_cli.export.xml import Node, collection, document, node, numbers, place
 from pathwalker_cli.model.anthropometry import Segment, Vector, segments
-from pathwalker_cli.model.contact import POINTS, ContactPoint
+from pathwalker_cli.model.contact import ContactPoint
 from pathwalker_cli.model.elements.curves import evaluate, samples
 from pathwalker_cli.model.elements.orthosis import AnkleOrthosis, orthosis_curve
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, Joint
+from pathwalker_cli.model.skeleton import TOED_WALKER, Joint
+from pathwalker_cli.model.urdf import point_place
 from pathwalker_cli.model.walker import Walker
 
 _AXES: Final[dict[str, Vector]] = {
@@ -49,7 +50,9 @@ def osim_text(walker: Walker) -> str:
     bushing between shank and foot; heels and toes are markers, as joints are, and spheres where
     feet roll.
     """
-    parts = segments(walker.patient, walker.condition, walker.published, walker.values)
+    parts = segments(
+        walker.patient, walker.condition, walker.published, walker.values, walker.skeleton
+    )
     orthoses = (_orthosis(element, walker) for element in walker.device.elements.values())
     model = node(
         "Model",
@@ -118,7 +121,7 @@ def _joint(part: Segment) -> Node:
     if part.parent and not part.joint:
         return node("WeldJoint", node("frames", frame), name=f"{part.name}_weld", **ends)
     names = (part.joint,) if part.parent else ROOT
-    joints = [joint for joint in PLANAR_WALKER.joints if joint.coordinate in names]
+    joints = [joint for joint in TOED_WALKER.joints if joint.coordinate in names]
     return node(
         "CustomJoint",
         node("frames", frame),
@@ -185,7 +188,7 @@ def _orthosis(element: AnkleOrthosis, walker: Walker) -> Node:
 def _markers(parts: Sequence[Segment], walker: Walker) -> Iterable[Node]:
     """Return a marker at every hinge, heel and toe."""
     hinges = [(part.joint, part.name, (0.0, 0.0, 0.0)) for part in parts if part.joint]
-    feet = [(point.name, point.link, _foot_point(point, walker)) for point in POINTS]
+    feet = [(point.name, point.link, _foot_point(point, walker)) for point in walker.parts.frames]
     for name, body, where in (*hinges, *feet):
         yield node(
             "Marker",
@@ -204,7 +207,7 @@ def _contact_geometry(walker: Walker) -> Iterable[Node]:
         socket_frame="/ground",
         orientation=numbers(0.0, 0.0, -np.pi / 2.0),
     )
-    for point, radius in zip(POINTS, walker.shapes, strict=False):
+    for point, radius in zip(walker.parts.frames, walker.shapes, strict=False):
         forward, up, right = _foot_point(point, walker)
         yield node(
             "ContactSphere",
@@ -216,5 +219,5 @@ def _contact_geometry(walker: Walker) -> Iterable[Node]:
 
 
 def _foot_point(point: ContactPoint, walker: Walker) -> Vector:
-    forward, up = getattr(walker.patient.contacts(walker.condition)[point.side], point.place)
+    forward, up = point_place(walker.patient, walker.condition, point)
     return place((forward, 0.0, up))

@@ -22,7 +22,6 @@ from pathwalker_cli.conventions import (
 from pathwalker_cli.export.osim import joint_path, optimal_forces
 from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.opensim import force_table, torque_table
-from pathwalker_cli.model.contact import POINTS
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import body_points
 from pathwalker_cli.trajectory import Trajectory
@@ -36,16 +35,17 @@ _UNLOADED: Final = 1e-6
 
 def motion_table(series: GaitSeries) -> Trajectory:
     """Return all coordinates [m, rad]."""
-    units = tuple(map(coordinate_unit, COORDINATES))
-    return Trajectory(series.time, COORDINATES, series.q, units)
+    names = series.walker.skeleton.coordinates
+    return Trajectory(series.time, names, series.q, tuple(map(coordinate_unit, names)))
 
 
 def state_table(series: GaitSeries) -> Trajectory:
     """Return coordinates, speeds and accelerations [SI] under OpenSim's names of its states."""
-    paths = [joint_path(name) for name in COORDINATES]
+    coordinates = series.walker.skeleton.coordinates
+    paths = [joint_path(name) for name in coordinates]
     names = [f"{path}/{what}" for what in ("value", "speed", "accel") for path in paths]
-    rates = list(map(velocity_unit, COORDINATES))
-    units = [*map(coordinate_unit, COORDINATES), *rates, *(f"{unit}^2" for unit in rates)]
+    rates = list(map(velocity_unit, coordinates))
+    units = [*map(coordinate_unit, coordinates), *rates, *(f"{unit}^2" for unit in rates)]
     values = np.hstack([series.q, series.v, series.vdot])
     return Trajectory(series.time, tuple(names), values, tuple(units))
 
@@ -83,8 +83,9 @@ def net_torque_table(series: GaitSeries) -> Trajectory:
 
     Columns are those of OpenSim's inverse dynamics.
     """
-    units = tuple(map(force_unit, COORDINATES))
-    return torque_table(Trajectory(series.time, COORDINATES, series.net_torque, units))
+    names = series.walker.skeleton.coordinates
+    units = tuple(map(force_unit, names))
+    return torque_table(Trajectory(series.time, names, series.net_torque, units))
 
 
 def control_table(series: GaitSeries) -> Trajectory:
@@ -102,7 +103,8 @@ def points(series: GaitSeries, name: str) -> Recording:
     """Return where joints, heels and toes are, `RATE` frames a second, as a recording."""
     frames = np.arange(int(series.duration * RATE) + 1) / RATE
     places = [body_points(series.walker, q) for q in motion_table(series).at(frames)]
-    markers = (*(name for name in COORDINATES if name not in ROOT), *(p.name for p in POINTS))
+    ends = (point.name for point in series.walker.parts.frames)
+    markers = (*(name for name in COORDINATES if name not in ROOT), *ends)
     positions = np.zeros((frames.size, len(markers), 3))
     positions[..., [0, 2]] = [[place[marker] for marker in markers] for place in places]
     return Recording(name, RATE, markers, positions, (), (), 1)

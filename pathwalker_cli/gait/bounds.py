@@ -9,14 +9,15 @@ from typing import Any, Final
 import numpy as np
 
 from pathwalker_cli.config import BoundsConfig, StudyConfig
-from pathwalker_cli.conventions import ANGLES, COORDINATES, GRAVITY, ROOT
+from pathwalker_cli.conventions import GRAVITY
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait import choices
-from pathwalker_cli.gait.problem import ACTIVATIONS, RESERVES, VELOCITIES
+from pathwalker_cli.gait.problem import ACTIVATIONS
 from pathwalker_cli.io.c3d_plates import LOADED
 from pathwalker_cli.io.fields import quantity_at
 from pathwalker_cli.model.contact import ContactPattern
 from pathwalker_cli.model.numbers import Unknown
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.problem import INFINITY, BoundTable
 from pathwalker_cli.patient import Patient
@@ -67,7 +68,7 @@ def gait_bounds(
     }
     entries |= _each(ACTIVATIONS, (0.0, 1.0))
     entries |= _joint_ranges(walker, config, sources)
-    entries |= _each(VELOCITIES, (-config.joint_speed, config.joint_speed))
+    entries |= _each(walker.skeleton.named("velocity"), (-config.joint_speed, config.joint_speed))
     pattern = walker.pattern
     for phase in pattern.phases:
         shortest, longest = config.phase_duration
@@ -78,16 +79,17 @@ def gait_bounds(
     if walker.parts.compliant:
         entries |= _toe_off(pattern)
     else:
-        loads = (force.name for force in pattern.forces if force.bears)
+        rigid = [point for point in pattern.points if point not in pattern.yielding]
+        loads = (f"{point.name}_z" for point in rigid)
         entries |= _each(loads, (config.least_vertical_force, INFINITY))
-        heights = (f"{point.name} height" for point in pattern.points)
+        heights = (f"{point.name} height" for point in rigid)
         entries |= _each(heights, (config.least_height, INFINITY))
         entries |= _lift_off(pattern)
     entries[("distance",)] = config.distance
     entries[("walking_speed",)] = (_least_speed(walker, config, sources), INFINITY)
     ranges, keys = _unknowns(walker, config, free, sources)
     entries |= {(name,): pair for name, pair in ranges.items()}
-    entries |= _each(RESERVES, (0.0, 0.0))
+    entries |= _each(walker.skeleton.named("reserve"), (0.0, 0.0))
     return GaitBounds(BoundTable(entries), sources, ranges, keys)
 
 
@@ -100,24 +102,27 @@ def recorded_durations(bounds: GaitBounds, durations: Mapping[str, float]) -> Ga
 
 
 def tracking_bounds(
-    bounds: GaitBounds, durations: Mapping[str, float], held: Mapping[str, float]
+    skeleton: Skeleton,
+    bounds: GaitBounds,
+    durations: Mapping[str, float],
+    held: Mapping[str, float],
 ) -> BoundTable:
     """Return the bounds of the first stage: given durations and parameters, free reserves.
 
     Durations [s] are given by phase, the values that are held [SI] by unknown.
     """
-    changes = _each((*RESERVES, "walking_speed"), ANYTHING)
-    changes |= _each(ANGLES, choices.TRACKING_ANGLES)
+    changes = _each((*skeleton.named("reserve"), "walking_speed"), ANYTHING)
+    changes |= _each(skeleton.angles, choices.TRACKING_ANGLES)
     changes |= {(name,): (value, value) for name, value in held.items()}
     return recorded_durations(bounds, durations).table.replace(changes)
 
 
-def helped_bounds(bounds: GaitBounds) -> BoundTable:
+def helped_bounds(skeleton: Skeleton, bounds: GaitBounds) -> BoundTable:
     """Return the bounds of a prediction with free reserves at the joints.
 
     The pelvis gets none: nobody carries the patient.
     """
-    helping = (name for name in COORDINATES if name not in ROOT)
+    helping = (name for name in skeleton.coordinates if name not in skeleton.root)
     return bounds.table.replace(_each((f"{name}_reserve" for name in helping), ANYTHING))
 
 
@@ -152,12 +157,16 @@ def _lift_off(pattern: ContactPattern) -> Entries:
 
 
 def _toe_off(pattern: ContactPattern) -> Entries:
-    """Return the force at the last instant of each step, where its foot counts as lifted."""
+    """Return the force at the last instant of each step, where its foot counts as lifted.
+
+    Of feet with toes it is the tip that leaves the ground.
+    """
+    toes = any(point.soft for point in pattern.points)
     return {
         (force.name, phase.name, "end"): (LOADED, LOADED)
         for phase in pattern.phases
         for force in phase.forces
-        if force.bears and force.point.side == phase.step
+        if force.bears and force.point.side == phase.step and force.point.soft == toes
     }
 
 
@@ -172,6 +181,9 @@ def _joint_ranges(walker: Walker, config: BoundsConfig, sources: dict[str, str])
             low, high = recorded.joint_ranges[name]
             low, high = low - margin, high + margin
             source = f"barefoot recordings widened by {margin:g} rad"
+        elif name not in PLANAR_WALKER.angles:
+            low, high = choices.TOE_ANGLES
+            source = "what toes can do"
         elif name in config.fallback_joint_ranges:
             low, high = config.fallback_joint_ranges[name]
             source = "fallback: the patient's file has no recorded ones"

@@ -73,8 +73,8 @@ def walked_distance(motion: PhasedMotion) -> float:
 def _squared_distance(motion: PhasedMotion, samples: tuple[Sample, ...]) -> float:
     """Return the sum over instants and coordinates of (q - q_recorded)^2 [rad^2 and m^2]."""
     states = (motion.phases[s.phase].states_at(np.array([s.fraction]))[0] for s in samples)
-    q = (state[: len(COORDINATES)] for state in states)
-    return sum(float(np.sum((a - s.data) ** 2)) for a, s in zip(q, samples, strict=True))
+    n, pairs = len(COORDINATES), zip(states, samples, strict=True)
+    return sum(float(np.sum((state[:n] - s.data[:n]) ** 2)) for state, s in pairs)
 
 
 def _totals(motion: PhasedMotion, integrals: Mapping[str, float]) -> Totals:
@@ -85,7 +85,7 @@ def _totals(motion: PhasedMotion, integrals: Mapping[str, float]) -> Totals:
 
 def _goal_gains(phase: PhaseMotion, costs: Costs, walker: Walker) -> np.ndarray:
     """Return the integrals of the goals' running costs over every interval, shape (N, k)."""
-    contact, n = phase_named(phase.name), len(COORDINATES)
+    contact, n = walker.pattern.phase(phase.name), walker.skeleton.size
     shape = phase.inner_states.shape[:2]
     fractions = phase.point_fractions.ravel()
     activation, rate = (
@@ -101,7 +101,8 @@ def _goal_gains(phase: PhaseMotion, costs: Costs, walker: Walker) -> np.ndarray:
     elements = walker.element_forces(*(x.reshape(-1, x.shape[-1]) for x in (q, v, activation)))
     worn = walker.device_torques(elements).reshape(*shape, -1)
     columns = q, v, activation, force, rate, excitation, vdot, reserve, q, heights, speeds, worn
-    point = Instant(contact, *(list(np.moveaxis(values, -1, 0)) for values in columns))
+    moved = (list(np.moveaxis(values, -1, 0)) for values in columns)
+    point = Instant(contact, *moved, coordinates=walker.skeleton.coordinates)
     running = costs.integrands(point, list(costs.numbers(walker)), costs.goals)
     values = np.array([np.broadcast_to(cost, shape) for cost in running])
     steps, weights = phase.duration * np.diff(phase.mesh), quadrature_weights(phase.degree)[1]

@@ -44,6 +44,7 @@ class Instant:
         heights: Heights of the places in the air, in the order of the walker's pattern [m].
         speeds: Their forward velocities [m/s].
         worn: Torques of the orthoses right, left [N m]; 0 where none is worn.
+        coordinates: Names of the coordinates.
         power: Power of the activations in the effort.
         data: Numbers of the term, see `CostTerm.size`.
     """
@@ -61,6 +62,7 @@ class Instant:
     heights: Sequence[Any] = ()
     speeds: Sequence[Any] = ()
     worn: Sequence[Any] = ()
+    coordinates: Sequence[str] = field(default=COORDINATES, kw_only=True)
     power: int = field(default=2, kw_only=True)
     data: Sequence[Any] = ()
 
@@ -73,8 +75,11 @@ class Instant:
         if not self.phase.compliant:
             return {SUFFIX[side]: float(side in self.phase.feet) for side in SIDES}
         pairs = zip(self.phase.forces, self.force, strict=True)
-        loads = {SUFFIX[f.point.side]: value**2 for f, value in pairs if f.bears}
-        return {side: load / (load + LOADED**2) for side, load in loads.items()}
+        loads: dict[str, Any] = {}
+        for f, value in pairs:
+            if f.bears:
+                loads[SUFFIX[f.point.side]] = loads.get(SUFFIX[f.point.side], 0.0) + value
+        return {side: load**2 / (load**2 + LOADED**2) for side, load in loads.items()}
 
     @property
     def vertical_force(self) -> dict[str, Any]:
@@ -84,7 +89,7 @@ class Instant:
 
     def angle(self, name: str) -> Any:
         """Return a coordinate by its name."""
-        return self.q[COORDINATES.index(name)]
+        return self.q[self.coordinates.index(name)]
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
+from pathwalker_cli.model.skeleton import TOED_WALKER
 from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
@@ -155,12 +156,14 @@ def _check(motion: PhasedMotion, path: str | Path) -> None:
 
 def _shapes(phase: PhaseMotion) -> dict[str, tuple[int, ...]]:
     """Return the shapes that belong to the mesh and the degree of a phase."""
-    n, nodes = len(COORDINATES), max(2, phase.mesh.size)
+    contact, nodes = phase_named(phase.name), max(2, phase.mesh.size)
+    n = len(COORDINATES)
+    if phase.states.shape[-1] == 2 * TOED_WALKER.size:
+        n, contact = TOED_WALKER.size, contact.with_toes
     inner = phase.inner_states.shape
     degree = inner[1] if len(inner) == 3 else 1
     width = phase.integrals.shape[-1] if phase.integrals.ndim else 0
     costs = max(width, len(Costs().integrals))  # goals and fits add some
-    forces = len(phase_named(phase.name).forces)
     return {
         "mesh": (nodes,),
         "states": (nodes, 2 * n),
@@ -168,5 +171,5 @@ def _shapes(phase: PhaseMotion) -> dict[str, tuple[int, ...]]:
         "controls": (nodes, len(GENERATORS)),
         "integrals": (nodes, costs),
         "inner_states": (nodes - 1, degree, 2 * n),
-        "algebraic": (nodes - 1, degree, 2 * n + forces),
+        "algebraic": (nodes - 1, degree, 2 * n + len(contact.forces)),
     }

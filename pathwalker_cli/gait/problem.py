@@ -31,6 +31,7 @@ from pathwalker_cli.model.elements.muscle import (
     DEACTIVATION_TIME,
     excitation_from_rate,
 )
+from pathwalker_cli.model.skeleton import Skeleton
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.frozen import FrozenTerms
 from pathwalker_cli.nlp.kernels import kernels
@@ -38,9 +39,6 @@ from pathwalker_cli.nlp.tape_store import Makers, cache_folder, keep_tapes, kept
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.problem import INFINITY, Boundary, MultiPhaseProblem, Phase, Rows, Variables
 
-VELOCITIES: Final = tuple(f"{name}_velocity" for name in COORDINATES)
-ACCELERATIONS: Final = tuple(f"{name}_acceleration" for name in COORDINATES)
-RESERVES: Final = tuple(f"{name}_reserve" for name in COORDINATES)
 ACTIVATIONS: Final = tuple(f"{name}_activation" for name in GENERATORS)
 RATES: Final = tuple(f"{name}_rate" for name in GENERATORS)
 Form = Literal["stride", "step", "passage"]
@@ -131,15 +129,16 @@ class GaitProblem:
         self.pattern = walker.pattern
         self.phases = self.pattern.steps[0] if form == "step" else self.pattern.phases
         self.constants = _Constants(walker, self.costs)
-        scale = np.repeat([1.0, choices.VELOCITY_SIZE], len(COORDINATES))
-        self.states = Variables.make("x", COORDINATES + VELOCITIES, scale)
-        self.q, self.v = ca.vertsplit(self.states.symbol, len(COORDINATES))
+        skeleton = walker.skeleton
+        scale = np.repeat([1.0, choices.VELOCITY_SIZE], skeleton.size)
+        self.states = Variables.make("x", skeleton.coordinates + skeleton.named("velocity"), scale)
+        self.q, self.v = ca.vertsplit(self.states.symbol, skeleton.size)
         self.activations = Variables.make("a", ACTIVATIONS, 1.0)
         self.rates = Variables.make("rate", RATES, choices.RATE_SIZE)
         names = tuple(unknown.name for unknown in walker.unknowns)
         sizes = np.array([unknown.scale for unknown in walker.unknowns])
         self.parameters = Variables.make("parameters", names, sizes)
-        self.reference = ca.SX.sym("q_ref", len(COORDINATES))
+        self.reference = ca.SX.sym("q_ref", skeleton.size)
 
     @property
     def structure(self) -> Hashable:
@@ -220,9 +219,9 @@ class GaitProblem:
         return ca.vertcat(*forces), ca.vertcat(*total), frozen
 
     def _phase(self, contact: ContactPhase, following: ContactPhase) -> Phase:
-        body, theta = self.walker.rigid_body, self._theta
-        names = ACCELERATIONS + contact.force_names + RESERVES
-        counts = [len(ACCELERATIONS), len(contact.forces), len(RESERVES)]
+        body, theta, skeleton = self.walker.rigid_body, self._theta, self.walker.skeleton
+        names = algebraic_names(skeleton, contact)
+        counts = [skeleton.size, len(contact.forces), skeleton.size]
         sizes = choices.ACCELERATION_SIZE, choices.CONTACT_FORCE_SIZE, choices.FORCE_SIZE
         z = Variables.make("z", names, np.repeat(sizes, counts))
         vdot, force, reserve = ca.vertsplit(z.symbol, np.cumsum([0, *counts]).tolist())
@@ -231,18 +230,19 @@ class GaitProblem:
         jacobian = self._of(body.point_jacobian(self.q, theta), contact.forces)
         balance = body.inverse_dynamics(self.q, self.v, vdot, theta) - tau - reserve
         balance -= jacobian.T @ force
-        equations = tuple(f"{name} equation of motion" for name in COORDINATES)
-        if contact.compliant:
-            given, what = force - self._ground_forces(position, velocity), "{0.name} force"
-        else:
-            given, what = acceleration, "{0.name} contact acceleration"
+        equations = tuple(f"{name} equation of motion" for name in skeleton.coordinates)
+        law = self._ground_forces(position, velocity)
+        soft = [contact.forces.index(f) for f in contact.yielding]
+        laws = tuple(f"{f.name} force" for f in contact.yielding)
+        still = "{0.name} contact acceleration"
         return Phase(
             name=contact.name,
             algebraic=z,
             derivative=ca.vertcat(self.v, vdot),
             residual=Rows.join(
                 Rows.make(balance, equations, choices.FORCE_SIZE),
-                self._rows(given, contact.forces, what, choices.FORCE_SIZE),
+                self._rows(acceleration, contact.rigid, still, choices.FORCE_SIZE),
+                Rows.make(force[soft] - law, laws, choices.FORCE_SIZE),
             ),
             path=self._path(contact, force, position),
             end=self._touch_down(contact.touched_down(following), position, velocity, acceleration),
@@ -261,15 +261,16 @@ class GaitProblem:
         )
 
     def _ground_forces(self, position: ca.SX, velocity: ca.SX) -> ca.SX:
-        """Return the forces on soles that give way, in the order of the pattern [N]."""
+        """Return the forces on places that give way, in the order of the pattern [N]."""
         constants = self.constants
         known = {**constants.numbers, **self._free}, constants.weight, constants.friction
         at, moved = ca.vertsplit(position), ca.vertsplit(velocity)
         forces = (
             ground_force(place, at[2 * i + 1], (moved[2 * i], moved[2 * i + 1]), *known)
             for i, place in enumerate(self.pattern.points)
+            if place in self.pattern.yielding
         )
-        return ca.vertcat(*(component for pair in forces for component in pair))
+        return ca.vertcat(ca.SX(0, 1), *(component for pair in forces for component in pair))
 
     def _integrands(
         self,
@@ -289,7 +290,8 @@ class GaitProblem:
             (column,) = self.walker.columns([element])
             worn[SIDES.index(side)] = self._torques[0][column]
         known = *columns, self.reference, heights, speeds, worn
-        point = Instant(contact, *(ca.vertsplit(x) if x.numel() else [] for x in known))
+        split = (ca.vertsplit(x) if x.numel() else [] for x in known)
+        point = Instant(contact, *split, coordinates=self.walker.skeleton.coordinates)
         numbers = ca.vertsplit(self.constants.cost_numbers)
         return ca.vertcat(*self.costs.integrands(point, numbers))
 
@@ -297,7 +299,8 @@ class GaitProblem:
         """Return the cost of one recorded instant of a passage."""
         if not self.costs.passage:
             return ca.SX(0)
-        return self._weights["fit"] * ca.sumsqr(self.q - self.reference)
+        recorded = slice(len(COORDINATES))
+        return self._weights["fit"] * ca.sumsqr((self.q - self.reference)[recorded])
 
     @property
     def _weights(self) -> dict[str, ca.SX]:
@@ -315,7 +318,8 @@ class GaitProblem:
         height = "{0.point.name} height"
         rows = [self._rows(position, airborne, height, choices.HEIGHT_SIZE, INFINITY)]
         for side in sorted(contact.feet):
-            parts = [(f, force[i]) for i, f in enumerate(contact.forces) if f.point.side == side]
+            parts = [(f, force[contact.forces.index(f)]) for f in contact.rigid]
+            parts = [(f, value) for f, value in parts if f.point.side == side]
             normal = sum(value for f, value in parts if f.bears)
             tangent = sum(value for f, value in parts if not f.bears)
             cone = self.constants.friction * normal
@@ -378,7 +382,7 @@ class GaitProblem:
     def _standing(self) -> Rows:
         """Return the rows that let the first phase begin on the ground and at rest there."""
         forces = self.phases[0].forces
-        position, velocity, _ = self._point_motion(ca.SX.zeros(len(COORDINATES)))
+        position, velocity, _ = self._point_motion(ca.SX.zeros(self.walker.skeleton.size))
         upward = [f for f in forces if f.bears]
         return Rows.join(
             self._rows(position, upward, "{0.point.name} height at the start", choices.HEIGHT_SIZE),
@@ -400,6 +404,11 @@ class GaitProblem:
         """Return rows in the directions of some forces; `name` is filled in with each."""
         names = tuple(name.format(force) for force in forces)
         return Rows.make(self._of(values, forces), names, scale, 0.0, upper)
+
+
+def algebraic_names(skeleton: Skeleton, contact: ContactPhase) -> tuple[str, ...]:
+    """Return the names of the algebraic variables of a phase in order."""
+    return skeleton.named("acceleration") + contact.force_names + skeleton.named("reserve")
 
 
 def _friction_names(side: Side) -> tuple[str, str]:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from pathwalker_cli.config import StartConfig
-from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES
+from pathwalker_cli.conventions import CONTACT_POINTS, COORDINATES, coordinate_unit
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.start import ReferenceStride
@@ -79,11 +79,10 @@ def recorded_stride(walker: Walker, recording: CompactRecording) -> ReferenceStr
     pairs = zip(gaps, choices.PHASE_SPLITS, strict=True)
     durations = np.array([part for gap, s in pairs for part in (gap * s, gap - gap * s)])
     closed[:, _TX] -= closed[0, _TX]
-    closed[:, _TZ] -= np.mean([walker.foot_points(q)[:, 1].min() for q in closed])
+    closed[:, _TZ] -= np.mean([walker.flat_footed.foot_points(q)[:, 1].min() for q in closed])
     grid = np.linspace(0.0, period, len(closed))
-    trajectory = Trajectory(grid, COORDINATES, closed, recording.motion.units)
-    phases = walker.pattern.durations(durations)
-    return ReferenceStride(f"recording {recording.name}", trajectory, phases)
+    phases, name = walker.pattern.durations(durations), f"recording {recording.name}"
+    return ReferenceStride(name, _of_all_joints(walker, grid, closed), phases)
 
 
 def recorded_passage(walker: Walker, recording: CompactRecording) -> ReferenceStride:
@@ -97,7 +96,7 @@ def recorded_passage(walker: Walker, recording: CompactRecording) -> ReferenceSt
         DataError: If the recording holds no such stride.
     """
     motion = recording.motion
-    heights = np.array([walker.foot_points(q)[:, 1] for q in motion.values])
+    heights = np.array([walker.flat_footed.foot_points(q)[:, 1] for q in motion.values])
     cuts = _phase_frames(_passage_frames(recording), heights, recording.name)
     part = slice(cuts[0], cuts[-1] + 1)
     values = motion.values[part].copy()
@@ -107,7 +106,14 @@ def recorded_passage(walker: Walker, recording: CompactRecording) -> ReferenceSt
     time = motion.time[part] - motion.time[cuts[0]]
     durations = walker.pattern.durations(np.diff(motion.time[cuts]))
     name = f"recording {recording.name} from {motion.time[cuts[0]]:.4f} s"
-    return ReferenceStride(name, Trajectory(time, motion.names, values, motion.units), durations)
+    return ReferenceStride(name, _of_all_joints(walker, time, values), durations)
+
+
+def _of_all_joints(walker: Walker, time: np.ndarray, values: np.ndarray) -> Trajectory:
+    """Return recorded coordinates (n, 10) with those of further joints at 0."""
+    names = walker.skeleton.coordinates
+    units = tuple(map(coordinate_unit, names))
+    return Trajectory(time, names, walker.skeleton.completed(values), units)
 
 
 def passage_samples(passage: ReferenceStride) -> tuple[Sample, ...]:

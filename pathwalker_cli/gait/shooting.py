@@ -292,7 +292,7 @@ def _solution(
     seconds["solve"] += shooting.seconds
     motion, costs = shooting.motion, shooting.running_costs
     if solver.config.half_cycle:
-        motion = full_stride(motion)
+        motion = full_stride(solver.walker.parts, motion)
         costs = {name: 2 * value for name, value in costs.items()}
     return replace(
         collocation,

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from pathwalker_cli.model.compliance import depth_under
-from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, joined
 
@@ -21,7 +20,7 @@ def sunk(walker: Walker, rolling: PhasedMotion) -> PhasedMotion:
     """
     steps = []
     for step in walker.pattern.phases:
-        parts = [p for p in rolling.phases if phase_named(p.name).step == step.step]
+        parts = [p for p in rolling.phases if walker.pattern.phase(p.name).step == step.step]
         if parts:
             steps.append(joined(step.name, [_pressed(walker, part) for part in parts]))
     return PhasedMotion(tuple(steps), rolling.parameters)
@@ -30,7 +29,7 @@ def sunk(walker: Walker, rolling: PhasedMotion) -> PhasedMotion:
 def _pressed(walker: Walker, phase: PhaseMotion) -> PhaseMotion:
     """Return a phase with the forces of both feet, and its postures as these press them."""
     pattern, n = walker.pattern, walker.skeleton.size
-    rows = pattern.indices(phase_named(phase.name))
+    rows = pattern.indices(pattern.phase(phase.name).forces)
     accelerations, given, reserves = np.split(phase.algebraic, [n, n + len(rows)], axis=-1)
     forces = np.zeros((*given.shape[:2], len(pattern.forces)))
     forces[..., rows] = given

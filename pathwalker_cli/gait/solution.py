@@ -179,7 +179,7 @@ class GaitSolution:
 
         Args:
             figure: "joint_angles", "joint_moments", "ground_forces", "activations",
-                "stick_figures", "ankle_torque" or "orthosis_curves".
+                "stick_figures", "ankle_torque", "orthosis_curves" or "toe_joints".
 
         Raises:
             NotConvergedError: If it did not converge.

@@ -12,6 +12,7 @@ import numpy as np
 
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import MeshConfig, StudyConfig
+from pathwalker_cli.conventions import COORDINATES
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
@@ -42,6 +43,7 @@ from pathwalker_cli.gait.solution import (
 from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.gait.stylised import stylised_stride
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
+from pathwalker_cli.gait.toes import with_toes
 from pathwalker_cli.gait.typical import TypicalWalk, typical_walks
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
@@ -217,9 +219,32 @@ class GaitSolver:
             settings = self.settings(tolerance, solver.warm_barrier)
             stage = self._on_first_mesh(self._warm_motion(warm_start), settings)
         else:
-            start, stage = self._from_typical_walk(tolerance) or self._from_stride(tolerance)
+            start, stage = self._from_the_start(tolerance)
         program, result, errors = self._refine(*stage, tolerance)
         return self._finish(program, result, errors, start)
+
+    def _from_the_start(self, tolerance: float) -> tuple[str, Stage]:
+        """Predict on the first mesh as the config's start says; with toes, from a walk without.
+
+        Raises:
+            KeyboardInterrupt: If the user stops it: there is no iterate of this problem yet.
+        """
+        if not self.walker.parts.toes:
+            return self._from_typical_walk(tolerance) or self._from_stride(tolerance)
+        known = self.walker.flat_footed.parts.numbers
+        names = {name for number in known for name in (number.address, number.place)}
+        free = {address: pair for address, pair in self.config.free.items() if address in names}
+        given = self.config.bounds.joint_ranges.items()
+        ranges = {name: pair for name, pair in given if name in COORDINATES}
+        values = {"model.toes": False, "free": free, "bounds.joint_ranges": ranges}
+        case = self.case.with_values(values)
+        flat = GaitSolver(case, self.observer, self.stages, self.seconds)
+        start, (program, result) = flat._from_the_start(tolerance)
+        if self._interrupted:
+            raise KeyboardInterrupt
+        found = program.to_motion(result.unknowns)
+        motion = replace(with_toes(self.walker, found), parameters=self.parameter_guess())
+        return start, self._on_first_mesh(motion, self.settings(tolerance, choices.TYPICAL_BARRIER))
 
     def _from_typical_walk(self, tolerance: float) -> tuple[str, Stage] | None:
         """Predict on the first mesh from the typical walk of the most similar child.
@@ -291,7 +316,7 @@ class GaitSolver:
 
         Returns None if not even reserves lead to a motion within the bounds.
         """
-        table = helped_bounds(self.bounds)
+        table = helped_bounds(self.walker.skeleton, self.bounds)
         numbers = self.numbers(choices.HELPED, table)
         program, result = self.stage("helped", motion, numbers, settings)
         if not result.converged:
@@ -314,7 +339,7 @@ class GaitSolver:
         return self._whole(program.to_motion(result.unknowns))
 
     def _whole(self, motion: PhasedMotion) -> PhasedMotion:
-        return full_stride(motion) if self.config.half_cycle else motion
+        return full_stride(self.walker.parts, motion) if self.config.half_cycle else motion
 
     def _tracked_on_soles(self) -> PhasedMotion:
         """Follow the stride of the start on soles that roll; return it sunk into the ground.
@@ -347,7 +372,8 @@ class GaitSolver:
         """
         mesh, stride, unknowns = self.config.mesh, self.stride, self.walker.unknowns
         held = self.parameter_guess() * [choices.FADED if u.faded else 1.0 for u in unknowns]
-        table = tracking_bounds(self.bounds, self._durations, self.by_name(held))
+        skeleton, values = self.walker.skeleton, self.by_name(held)
+        table = tracking_bounds(skeleton, self.bounds, self._durations, values)
         meshes = meshing.first(stride.durations[: len(self.gait.phases)], mesh)
         costs = len(self.gait.costs.integrals)
         motion = stride.motion(self.walker, held, meshes, mesh.degree, costs)

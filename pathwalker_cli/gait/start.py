@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from pathwalker_cli.conventions import COORDINATES, GENERATORS
+from pathwalker_cli.conventions import GENERATORS
 from pathwalker_cli.gait import choices
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, collocation_points
@@ -21,7 +21,7 @@ class ReferenceStride:
 
     Args:
         name: Where it comes from, for records.
-        trajectory: `conventions.COORDINATES` over one stride from left toe-off on.
+        trajectory: The coordinates of the walker over one stride from left toe-off on.
         durations: Durations of the phases of the walker's pattern [s], shape (k,).
     """
 
@@ -63,7 +63,8 @@ class ReferenceStride:
     ) -> PhaseMotion:
         contact, count, weight = walker.pattern.phases[i], len(mesh), walker.weight
         bearing = [force.bears for force in contact.forces]
-        still = np.zeros(len(COORDINATES))  # accelerations before the forces, reserves behind them
+        # accelerations before the forces, reserves behind them
+        still = np.zeros(walker.skeleton.size)
         algebraic = [still, np.where(bearing, weight / sum(bearing), 0.0), still]
 
         def states(at: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from pathwalker_cli.conventions import COORDINATES, GRAVITY, coordinate_unit
+from pathwalker_cli.conventions import GRAVITY, coordinate_unit
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.model.walker import Walker
@@ -99,7 +99,7 @@ def stylised_trajectory(walker: Walker, gait: StylisedGait, samples: int = 201) 
     constant speed and height, and the leg angles follow from the leg's geometry.
 
     Returns:
-        Columns `conventions.COORDINATES` [m, rad] from the start of right_flat on.
+        The coordinates of the walker [m, rad] from the start of right_flat on.
     """
     time = np.linspace(0.0, gait.stride_time, samples)
     legs = {side: _leg(walker, side) for side in "rl"}
@@ -125,9 +125,9 @@ def stylised_trajectory(walker: Walker, gait: StylisedGait, samples: int = 201) 
         q[f"hip_{side}"] = thigh - gait.pelvis_tilt
         q[f"knee_{side}"] = knee
         q[f"ankle_{side}"] = pitch - thigh - knee
-    values = np.column_stack([np.broadcast_to(q[name], samples) for name in COORDINATES])
-    units = tuple(coordinate_unit(name) for name in COORDINATES)
-    return Trajectory(time, COORDINATES, values, units)
+    names = walker.skeleton.coordinates
+    values = np.column_stack([np.broadcast_to(q.get(name, 0.0), samples) for name in names])
+    return Trajectory(time, names, values, tuple(map(coordinate_unit, names)))
 
 
 def _leg(walker: Walker, side: str) -> _Leg:

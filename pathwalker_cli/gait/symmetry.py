@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import COORDINATES, GENERATORS, mirror_permutation, mirrored
+from pathwalker_cli.conventions import GENERATORS, mirror_permutation, mirrored
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.cost_terms import walked_distance
-from pathwalker_cli.gait.problem import ACCELERATIONS, RESERVES, VELOCITIES
-from pathwalker_cli.model.contact import mirrored_phase, phase_named
+from pathwalker_cli.gait.problem import algebraic_names
+from pathwalker_cli.model.contact import mirrored_phase
+from pathwalker_cli.model.parts import Parts
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
@@ -19,11 +20,11 @@ from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 def asymmetries(walker: Walker) -> list[str]:
     """Return in words what differs between the sides of a walker."""
     model, strengths = walker.model, walker.max_isometric_torque
-    order = mirror_permutation(COORDINATES)
-    right, left = np.split(walker.foot_points(np.zeros(len(COORDINATES))), 2)
+    order, zero = mirror_permutation(walker.skeleton.coordinates), np.zeros(walker.skeleton.size)
+    right, left = np.split(walker.foot_points(zero), 2)
     shapes = {n.place: walker.values[n.address] for n in walker.parts.shapes}
     round_alike = all(shapes[n.place] == walker.values[n.address] for n in walker.parts.shapes)
-    q = np.linspace(-0.3, 0.6, len(COORDINATES))
+    q = np.linspace(-0.3, 0.6, zero.size)
     bias, swapped = (pin.nonLinearEffects(model, model.createData(), k, k) for k in (q, q[order]))
     alike = {
         "strengths": np.allclose(strengths, strengths[mirror_permutation(GENERATORS)]),
@@ -59,23 +60,24 @@ def require_symmetry(walker: Walker) -> None:
         )
 
 
-def full_stride(step: PhasedMotion) -> PhasedMotion:
+def full_stride(parts: Parts, step: PhasedMotion) -> PhasedMotion:
     """Return a step, which ends in its own mirrored beginning, followed by its mirror image."""
     length = walked_distance(step)
     costs = step.phases[-1].integrals[-1] - step.phases[0].integrals[0]
-    second = tuple(_mirrored(phase, length, costs) for phase in step.phases)
+    second = tuple(_mirrored(parts, phase, length, costs) for phase in step.phases)
     return PhasedMotion(step.phases + second, step.parameters)
 
 
-def _mirrored(phase: PhaseMotion, length: float, costs: np.ndarray) -> PhaseMotion:
+def _mirrored(parts: Parts, phase: PhaseMotion, length: float, costs: np.ndarray) -> PhaseMotion:
     """Return a phase with left and right exchanged, one step on."""
-    here, there = phase_named(phase.name), mirrored_phase(phase.name)
-    order, muscles = mirror_permutation(COORDINATES + VELOCITIES), mirror_permutation(GENERATORS)
-    names = ACCELERATIONS + here.force_names + RESERVES
-    wanted = ACCELERATIONS + there.force_names + RESERVES
+    skeleton, pattern = parts.skeleton, parts.pattern
+    here, there = (pattern.phase(p) for p in (phase.name, mirrored_phase(phase.name).name))
+    names, wanted = (algebraic_names(skeleton, contact) for contact in (here, there))
+    muscles = mirror_permutation(GENERATORS)
+    order = mirror_permutation(skeleton.coordinates + skeleton.named("velocity"))
     states, inner = phase.states[:, order], phase.inner_states[..., order]
     for values in (states, inner):
-        values[..., COORDINATES.index("pelvis_tx")] += length
+        values[..., skeleton.index("pelvis_tx")] += length
     return replace(
         phase,
         name=there.name,

@@ -7,12 +7,15 @@ that connects it to its parent.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from pathwalker_cli.conventions import SIDES, SUFFIX, Condition
+from pathwalker_cli.errors import PatientError
+from pathwalker_cli.model.choices import TOES_MASS_SHARE
 from pathwalker_cli.model.devices import device_on
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, TOED_WALKER, Skeleton
 
 if TYPE_CHECKING:
     from pathwalker_cli.patient import Patient
@@ -120,6 +123,7 @@ def segments(
     condition: Condition,
     published: bool = False,
     values: Mapping[str, float] | None = None,
+    skeleton: Skeleton = PLANAR_WALKER,
 ) -> tuple[Segment, ...]:
     """Return the segments of a patient, parents before children.
 
@@ -129,15 +133,22 @@ def segments(
         published: Hang the right lower arm and hand where the published model has them: at the
             length of the segment itself below its parent's origin instead of at the parent's.
         values: Masses of the device by address [kg], if not those of the patient's file.
+        skeleton: Which joints there are.
     """
     mass = (values or {}).get
     added = {
         link: mass(number.address, patient.number(number.address))
         for link, number in device_on(patient.braced(condition)).added_mass.items()
     }
+    legs = [part for side in SIDES for part in _leg(patient, side, added)]
+    if skeleton is TOED_WALKER:
+        soles = patient.contacts(condition)
+        for side in SIDES:
+            at = next(i for i, part in enumerate(legs) if part.name == f"foot_{SUFFIX[side]}")
+            legs[at : at + 1] = _split(legs[at], soles[side].toe, patient.toes_length(side))
     return (
         _segment(patient, "pelvis", "", 0.0),
-        *(s for side in SIDES for s in _leg(patient, side, added)),
+        *legs,
         _segment(patient, "trunk", "pelvis", patient.length("lumbar_height"), "lumbar"),
         _segment(patient, "head", "trunk", patient.length("trunk")),
         *(s for side in SIDES for s in _arm(patient, side, published and side == "right")),
@@ -164,6 +175,50 @@ def _leg(patient: Patient, side: str, added: Mapping[str, float]) -> tuple[Segme
         )
         for name, parent, joint, drop in chain
     )
+
+
+def _split(foot: Segment, ball: tuple[float, float], length: float) -> tuple[Segment, Segment]:
+    """Return a foot without its toes, and the toes: together they are the foot as it was.
+
+    The toes are a uniform rod from the ball on, as high as the foot's own centre of mass.
+
+    Args:
+        foot: The foot in one piece.
+        ball: Where the joint is: in front of the ankle, above it [m].
+        length: Of the toes [m].
+
+    Raises:
+        PatientError: If the joint is so far in front that no foot would be left behind it.
+    """
+    (x, z), share, (along, across, _) = ball, TOES_MASS_SHARE, foot.inertia
+    far = x + length / 2.0 - foot.com[0]
+    rod = share * foot.mass * length**2 / 12.0
+    toes = Segment(
+        name=foot.name.replace("foot", "toes"),
+        parent=foot.name,
+        joint=foot.joint.replace("ankle", "mtp"),
+        origin=(x, 0.0, z),
+        length=length,
+        mass=share * foot.mass,
+        com=(length / 2.0, 0.0, foot.com[2] - z),
+        inertia=(rod * along / across, rod, rod),
+    )
+    rest = across - rod - share / (1.0 - share) * foot.mass * far**2
+    if rest <= 0.0:
+        raise PatientError(
+            f"has its toe at {x:g} m, too far in front of the {foot.name.replace('_', ' ')} to be "
+            "the ball of the foot, where a toe joint would be",
+            where="contact_points.barefoot",
+            mend="set model.toes to false, or give the ball of the foot",
+        )
+    behind = foot.com[0] - share / (1.0 - share) * far
+    left = replace(
+        foot,
+        mass=(1.0 - share) * foot.mass,
+        com=(behind, 0.0, foot.com[2]),
+        inertia=(rest * along / across, rest, rest),
+    )
+    return left, toes
 
 
 def _arm(patient: Patient, side: str, misplaced: bool) -> tuple[Segment, ...]:

@@ -23,13 +23,21 @@ NO_PRELOAD: Final = 1e-12
 """Keeps the ratio of an orthosis without preload finite [N m]."""
 
 # Feet.
-ROCKER_SHARES: Final = {"heel": 0.18, "toe": 0.18}
+ROCKER_SHARES: Final = {"heel": 0.18, "toe": 0.18, "tip": 0.05}
 """Radii of the rockers as shares of the foot from heel to ball: 35 mm of an adult, the size of a
-heel's pad."""
+heel's pad; the tip of the toes 1 cm."""
 
 ROUNDNESS: Final = 1.5
 """Radius of a sole where it lies flat, beside its length: under a child that crouches the centre of
 pressure moves 2 to 4 cm while the bare foot turns by .17 rad (see docs/theory.md)."""
+
+TOES_MASS_SHARE: Final = 0.138
+"""Toes' part of the mass of the foot: 0.2166 of 1.5666 kg in the lower limb of Delp et al. (1990),
+as OpenSim distributes it."""
+TOE_STIFFNESS: Final = 25.0
+"""Stiffness of an adult's metatarsophalangeal joint [N m/rad]; Falisse et al. (2022)."""
+TOE_DAMPING: Final = 2.0
+"""Its damping [N m s/rad]; Falisse et al. (2022)."""
 
 SOLE_DEPTH: Final = 0.117
 """How deep one foot sinks under body weight, as a share of its length: 24.5 mm of an adult of 75 kg

@@ -7,7 +7,7 @@ one left step.  That of Sreenivasa et al. (2017), section 2.3, is "heel_toe" on 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
@@ -97,22 +97,27 @@ HEEL_TOE: Final[Contact] = (USES["heel_toe"], USES["heel_toe"])
 class ContactPoint:
     """A place of a foot that may stand on the ground."""
 
-    place: Literal["heel", "toe", "sole"]
+    place: Literal["heel", "toe", "sole", "tip"]
     side: Side
 
     @property
     def name(self) -> str:
-        """Name of the place, e.g. "heel_r"; of heel and toe also that of its frame."""
+        """Name of the place, e.g. "heel_r"; but for soles also that of its frame."""
         return f"{self.place}_{SUFFIX[self.side]}"
 
     @property
     def link(self) -> str:
         """The link that carries it."""
-        return f"foot_{SUFFIX[self.side]}"
+        return f"{'toes' if self.soft else 'foot'}_{SUFFIX[self.side]}"
+
+    @property
+    def soft(self) -> bool:
+        """Whether it gives way under any foot: the pads of toes that a joint carries."""
+        return self.place == "tip"
 
     @cached_property
     def shape(self) -> Number:
-        """Radius of the circle of heel or toe [m], roundness of the sole [-]."""
+        """Radius of the circle of heel, toe or tip [m], roundness of the sole [-]."""
         if self.place == "sole":
             return Number(
                 f"sole_roundness.{self.side}", "sole_roundness", "roundness of the sole", "1",
@@ -128,16 +133,16 @@ class ContactPoint:
 
     @cached_property
     def law(self) -> tuple[Number, Number, Number]:
-        """Numbers of a sole that gives way: depth under body weight, damping, sliding speed."""
+        """Numbers of what gives way: depth under body weight, damping, sliding speed."""
 
         def depth(patient: Patient) -> float:
             return SOLE_DEPTH * patient.length("foot", self.side)
 
         source = "Ackermann and van den Bogert (2010), scaled, see model.choices"
         entries: tuple[tuple[str, str, str, Any], ...] = (
-            ("sole_depth", "depth to which a sole sinks", "m", depth),
-            ("sole_damping", "damping of the sole", "s/m", SOLE_DAMPING),
-            ("sole_creep", "sliding speed of the sole", "m/s", SOLE_CREEP),
+            (f"{self.place}_depth", f"depth to which a {self.place} sinks", "m", depth),
+            (f"{self.place}_damping", f"damping of the {self.place}", "s/m", SOLE_DAMPING),
+            (f"{self.place}_creep", f"sliding speed of the {self.place}", "m/s", SOLE_CREEP),
         )
         first, second, third = (
             Number(f"{name}.{self.side}", name, label, unit, self.side, default, source)
@@ -174,9 +179,9 @@ class ContactPhase:
     """A stretch of gait in which the same contact forces act.
 
     Args:
-        forces: Active components; each stands for one direction in which its place does not move.
+        forces: Active components.
         step: The side that stands while the other one swings and lands.
-        compliant: Whether forces follow from how places sink and slide, on the ground or off it.
+        compliant: Whether all places give way, not those alone that always do.
     """
 
     name: str
@@ -190,9 +195,25 @@ class ContactPhase:
         return tuple(force.name for force in self.forces)
 
     @cached_property
+    def yielding(self) -> tuple[ContactForce, ...]:
+        """Forces that follow from how their places sink and slide, on the ground or off it."""
+        return tuple(force for force in self.forces if self.compliant or force.point.soft)
+
+    @cached_property
+    def rigid(self) -> tuple[ContactForce, ...]:
+        """Forces that each stand for one direction in which their place does not move."""
+        return tuple(force for force in self.forces if force not in self.yielding)
+
+    @cached_property
     def points(self) -> tuple[ContactPoint, ...]:
-        """Places on the ground."""
-        return tuple(dict.fromkeys(force.point for force in self.forces))
+        """Places that are on the ground because the phase says so; of soles that give way both."""
+        given = self.forces if self.compliant else self.rigid
+        return tuple(dict.fromkeys(force.point for force in given if not force.point.soft))
+
+    @property
+    def with_toes(self) -> ContactPhase:
+        """The same phase of feet with toes: their tips push whenever they touch the ground."""
+        return replace(self, forces=(*self.forces, *_both(TIPS)))
 
     @property
     def feet(self) -> tuple[Side, ...]:
@@ -205,7 +226,7 @@ class ContactPhase:
 
         Of a rigid foot that stands already, that is the vertical one alone.
         """
-        new = (force for force in following.forces if force.point not in self.points)
+        new = (force for force in following.rigid if force.point not in self.points)
         return tuple(f for f in new if f.bears or f.point.side not in self.feet)
 
     def lifted_off(self, following: ContactPhase) -> tuple[ContactForce, ...]:
@@ -214,7 +235,7 @@ class ContactPhase:
         While its foot stays on the ground a place loses its vertical force only: the friction
         of a rigid foot may pass from heel to toe at once.
         """
-        gone = [force for force in self.forces if force.point not in following.points]
+        gone = [force for force in self.rigid if force.point not in following.points]
         return tuple(f for f in gone if f.bears or f.point.side not in following.feet)
 
 
@@ -223,7 +244,8 @@ class ContactPattern:
     """The phases of a stride, from left toe-off on, and the places that take part.
 
     Args:
-        points: All places, right before left; those that never stand may not sink either.
+        points: All places, right before left, tips of toes last; those that never stand may not
+            sink either.
         phases: The phases in order.
     """
 
@@ -233,7 +255,12 @@ class ContactPattern:
     @cached_property
     def forces(self) -> tuple[ContactForce, ...]:
         """All components of the ground reaction forces (on the body) in order [N]."""
-        return tuple(ContactForce(point, axis) for point in self.points for axis in ("x", "z"))
+        return _both(self.points)
+
+    @cached_property
+    def yielding(self) -> tuple[ContactPoint, ...]:
+        """The places that give way."""
+        return tuple(dict.fromkeys(force.point for force in self.phases[0].yielding))
 
     @cached_property
     def force_names(self) -> tuple[str, ...]:
@@ -256,18 +283,33 @@ class ContactPattern:
         """The phase that comes after each, of the last one the first."""
         return self.phases[1:] + self.phases[:1]
 
-    def indices(self, phase: ContactPhase) -> list[int]:
-        """Return the positions of a phase's components in `forces`."""
-        return [self.forces.index(force) for force in phase.forces]
+    def indices(self, forces: Sequence[ContactForce]) -> list[int]:
+        """Return the positions of some components in `forces`."""
+        return [self.forces.index(force) for force in forces]
+
+    def upward(self, points: Sequence[ContactPoint]) -> list[int]:
+        """Return the positions in `forces` of the vertical components of some places."""
+        return [2 * self.points.index(point) + 1 for point in points]
+
+    def phase(self, phase: str | int | ContactPhase) -> ContactPhase:
+        """Return a phase of such feet; see `phase_named`."""
+        if isinstance(phase, ContactPhase):
+            return phase
+        found = phase_named(phase)
+        return found.with_toes if any(point.soft for point in self.points) else found
 
     def rows(self, side: Side) -> list[int]:
         """Return the positions of the places of a side in `points`."""
         return [i for i, point in enumerate(self.points) if point.side == side]
 
     def in_the_air(self, phase: ContactPhase) -> list[int]:
-        """Return the positions in `points` of the places that are not on the ground."""
-        aloft = () if phase.compliant else phase.points
-        return [i for i, point in enumerate(self.points) if point not in aloft]
+        """Return the positions in `points` of the places that are not on the ground.
+
+        Tips of toes are none: the ground pushes them wherever they are.
+        """
+        standing = () if phase.compliant else phase.points
+        pairs = enumerate(self.points)
+        return [i for i, point in pairs if point not in standing and not point.soft]
 
     def strike(self, side: Side) -> int:
         """Return the number of the phase that begins with the foot strike of a side."""
@@ -305,6 +347,14 @@ POINTS: Final = tuple(ContactPoint(place, side) for side in SIDES for place in (
 
 _SOLES: Final = tuple(ContactPoint("sole", side) for side in SIDES)
 
+TIPS: Final = tuple(ContactPoint("tip", side) for side in SIDES)
+"""Tips of toes that a joint carries."""
+
+
+def _both(points: Sequence[ContactPoint]) -> tuple[ContactForce, ...]:
+    """Return both components of the forces on some places."""
+    return tuple(ContactForce(point, axis) for point in points for axis in ("x", "z"))
+
 
 def _on(side: Side, posture: str) -> tuple[ContactForce, ...]:
     """Return the components of a foot on the ground; flat, friction counts once."""
@@ -331,8 +381,13 @@ def _step(side: Side, single: Sequence[str], landing: Sequence[str]) -> list[Con
 
 
 @cache
-def contact_pattern(feet: Feet = "points", contact: Contact = HEEL_TOE) -> ContactPattern:
-    """Return the pattern of feet that are used like this."""
+def contact_pattern(
+    feet: Feet = "points", contact: Contact = HEEL_TOE, toes: bool = False
+) -> ContactPattern:
+    """Return the pattern of feet that are used like this, with toes that a joint carries or not."""
+    if toes:
+        bare = contact_pattern(feet, contact)
+        return ContactPattern((*bare.points, *TIPS), tuple(p.with_toes for p in bare.phases))
     if feet == "sole":
         phases = [p for side in SIDES for p in _step(side, ("sole",), ("sole",))]
         return ContactPattern(_SOLES, tuple(phases))

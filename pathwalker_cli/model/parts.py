@@ -12,8 +12,10 @@ from pathwalker_cli.model.contact import (
     HEEL_TOE,
     POINTS,
     SOLES,
+    TIPS,
     Contact,
     ContactPattern,
+    ContactPoint,
     Feet,
     contact_pattern,
 )
@@ -21,11 +23,13 @@ from pathwalker_cli.model.devices import Device, device_on
 from pathwalker_cli.model.elements import ForceElement, registered_elements
 from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generators
 from pathwalker_cli.model.elements.tissue import leg_tissue
+from pathwalker_cli.model.elements.toes import toe_joints
 from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at
-from pathwalker_cli.model.skeleton import Side
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, TOED_WALKER, Side, Skeleton
 
 _MUSCLES: Final = generators()
 _TISSUE: Final = leg_tissue()
+_TOES: Final = toe_joints()
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,7 @@ class Parts:
         contact: How right and left foot are used; a sole needs to know nothing of it.
         further: Names of force elements that were registered, see `extensions`.
         braced: Sides that wear an orthosis.
+        toes: Whether a joint carries the toes.
     """
 
     condition: Condition = "barefoot"
@@ -47,11 +52,17 @@ class Parts:
     contact: Contact = HEEL_TOE
     further: tuple[str, ...] = ()
     braced: tuple[Side, ...] = ()
+    toes: bool = False
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """Bodies and joints."""
+        return TOED_WALKER if self.toes else PLANAR_WALKER
 
     @property
     def pattern(self) -> ContactPattern:
         """The order in which places of the feet stand on the ground."""
-        return contact_pattern(self.feet, self.contact)
+        return contact_pattern(self.feet, self.contact, self.toes)
 
     @property
     def soles(self) -> bool:
@@ -80,20 +91,26 @@ class Parts:
         Raises:
             ConfigError: If nothing has registered one of the further ones.
         """
-        return (*(_TISSUE if self.tissue else ()), *registered_elements(self.further))
+        toes, tissue = _TOES if self.toes else (), _TISSUE if self.tissue else ()
+        return (*tissue, *toes, *registered_elements(self.further))
 
     @cached_property
     def elements(self) -> tuple[ForceElement, ...]:
         """All force elements: muscles, other tissue, then what the device adds."""
         return (*self.muscles, *self.passive, *self.device.forces)
 
+    @property
+    def frames(self) -> tuple[ContactPoint, ...]:
+        """Heels and toes, the ends of soles, and tips where a joint carries toes."""
+        return (*POINTS, *(TIPS if self.toes else ()))
+
     @cached_property
     def shapes(self) -> tuple[Number, ...]:
-        """Radii of the circles in the order of `POINTS`, roundness of the soles; none of points."""
+        """Radii of the circles in the order of `frames`, roundness of soles; none of points."""
         if self.feet == "points":
             return ()
-        round_soles = self.pattern.points if self.soles else ()
-        return tuple(point.shape for point in (*POINTS, *round_soles))
+        soles = [point for point in self.pattern.points if self.soles and not point.soft]
+        return tuple(point.shape for point in (*self.frames, *soles))
 
     @cached_property
     def body_numbers(self) -> tuple[Number, ...]:
@@ -104,8 +121,8 @@ class Parts:
     def numbers(self) -> tuple[Number, ...]:
         """Every named number: of the elements, of the bodies, of what gives way."""
         of_elements = (n for element in self.elements for n in element.numbers)
-        yielding = self.pattern.points if self.compliant else ()
-        return (*of_elements, *self.body_numbers, *(n for place in yielding for n in place.law))
+        laws = (number for place in self.pattern.yielding for number in place.law)
+        return (*of_elements, *self.body_numbers, *laws)
 
     def unknowns(self, free: Sequence[str] = ()) -> tuple[Unknown, ...]:
         """Return what a problem chooses: what is asked for, and what a device is identified by.

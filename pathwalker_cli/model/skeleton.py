@@ -2,7 +2,8 @@
 
 World frame: x forward, z up, rotations about +y (right-hand rule), SI units and radians.
 Positive: pelvis_tilt and lumbar = forward lean, hip = extension, knee = flexion,
-ankle = plantarflexion.  The zero pose is upright with straight legs and feet at 90 degrees.
+ankle = plantarflexion, mtp (toes) = flexion, so that it is negative when the heel rises.  The zero
+pose is upright with straight legs and feet at 90 degrees.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, Literal
+
+import numpy as np
 
 Side = Literal["right", "left"]
 SIDES: Final[tuple[Side, Side]] = ("right", "left")
@@ -75,6 +78,15 @@ class Skeleton:
         """Return the position of a coordinate."""
         return self.coordinates.index(coordinate)
 
+    def named(self, what: str) -> tuple[str, ...]:
+        """Return names of what belongs to every coordinate, e.g. "velocity"."""
+        return tuple(f"{name}_{what}" for name in self.coordinates)
+
+    def completed(self, q: np.ndarray) -> np.ndarray:
+        """Return postures (..., m) with the coordinates behind the first m at 0, (..., size)."""
+        further = np.zeros((*q.shape[:-1], self.size - q.shape[-1]))
+        return np.concatenate([q, further], axis=-1)
+
 
 def _leg(side: Side) -> tuple[Joint, ...]:
     s = SUFFIX[side]
@@ -96,3 +108,12 @@ PLANAR_WALKER: Final = Skeleton(
     )
 )
 """The sagittal walker of Sreenivasa et al. (2017): two translations, eight angles."""
+
+TOED_WALKER: Final = Skeleton(
+    (
+        *PLANAR_WALKER.joints,
+        Joint("mtp_r", "foot_r", "toes_r", side="right"),
+        Joint("mtp_l", "foot_l", "toes_l", side="left"),
+    )
+)
+"""The same with a metatarsophalangeal joint in each foot."""

@@ -14,8 +14,8 @@ import pinocchio as pin
 
 from pathwalker_cli.conventions import GRAVITY, Condition
 from pathwalker_cli.model.anthropometry import Segment, Vector, segments
-from pathwalker_cli.model.contact import POINTS
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, Joint
+from pathwalker_cli.model.contact import POINTS, TIPS, ContactPoint
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, TOED_WALKER, Joint, Skeleton
 from pathwalker_cli.patient import Patient
 
 _LIMITS: Final = '<limit lower="{0}" upper="{1}" effort="1000" velocity="100"/>'
@@ -31,6 +31,7 @@ def urdf_text(
     condition: Condition,
     published: bool = False,
     values: Mapping[str, float] | None = None,
+    skeleton: Skeleton = PLANAR_WALKER,
 ) -> str:
     """Return the walker as URDF text; the same input always gives the same bytes.
 
@@ -42,14 +43,15 @@ def urdf_text(
         f"     Written by PathWalker from the patient {patient.id}; change that, not this. -->",
         f'<robot name="{patient.id}-{condition}">',
         '  <link name="world"/>',
-        *(line for joint in PLANAR_WALKER.joints if joint.root for line in _hung(joint)),
+        *(line for joint in skeleton.joints if joint.root for line in _hung(joint)),
     ]
-    for part in segments(patient, condition, published, values):
+    for part in segments(patient, condition, published, values, skeleton):
         lines += _link(part)
         if part.parent:
             lines += _joint(part.joint, part.parent, part.name, part.origin)
-    for point in POINTS:
-        x, z = getattr(patient.contacts(condition)[point.side], point.place)
+    tips = TIPS if skeleton is TOED_WALKER else ()
+    for point in (*POINTS, *tips):
+        x, z = point_place(patient, condition, point)
         lines.append(f'  <link name="{point.name}"/>')
         lines += _joint("", point.link, point.name, (x, 0.0, z))
     return "\n".join([*lines, "</robot>", ""])
@@ -60,11 +62,21 @@ def pinocchio_model(
     condition: Condition,
     published: bool = False,
     values: Mapping[str, float] | None = None,
+    skeleton: Skeleton = PLANAR_WALKER,
 ) -> pin.Model:
     """Return the walker's Pinocchio model; arguments as of `urdf_text`; q as in the skeleton."""
-    model = _ordered(pin.buildModelFromXML(urdf_text(patient, condition, published, values)))
+    text = urdf_text(patient, condition, published, values, skeleton)
+    model = _ordered(pin.buildModelFromXML(text), skeleton)
     model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
     return model
+
+
+def point_place(patient: Patient, condition: Condition, point: ContactPoint) -> tuple[float, float]:
+    """Return where a point is in the frame of its link: forward, up [m]."""
+    if point.soft:
+        return patient.toes_length(point.side), 0.0
+    x, z = getattr(patient.contacts(condition)[point.side], point.place)
+    return float(x), float(z)
 
 
 def _numbers(values: Iterable[float]) -> str:
@@ -113,7 +125,7 @@ def _hung(joint: Joint) -> list[str]:
     ]
 
 
-def _ordered(parsed: pin.Model) -> pin.Model:
+def _ordered(parsed: pin.Model, skeleton: Skeleton) -> pin.Model:
     """Return the same model with its joints in the order of the skeleton.
 
     The parser sorts the children of a link by name, which puts the left leg before the right one.
@@ -121,7 +133,7 @@ def _ordered(parsed: pin.Model) -> pin.Model:
     model: Any = pin.Model()
     model.name = parsed.name
     new_index = {0: 0}
-    for name in PLANAR_WALKER.coordinates:
+    for name in skeleton.coordinates:
         old = parsed.getJointId(name)
         parent, placement = new_index[parsed.parents[old]], parsed.jointPlacements[old]
         new_index[old] = model.addJoint(parent, parsed.joints[old], placement, name)

@@ -24,7 +24,6 @@ from pathwalker_cli.model.contact import (
     ContactPattern,
     ContactPhase,
     Feet,
-    phase_named,
 )
 from pathwalker_cli.model.devices import Device
 from pathwalker_cli.model.elements import ForceElement, State, element_forces, generalised_forces
@@ -32,7 +31,7 @@ from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator
 from pathwalker_cli.model.elements.orthosis import OrthosisSide
 from pathwalker_cli.model.numbers import Number, Unknown
 from pathwalker_cli.model.parts import Parts
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, Side, Skeleton
+from pathwalker_cli.model.skeleton import Side, Skeleton
 from pathwalker_cli.model.urdf import pinocchio_model
 from pathwalker_cli.patient import Patient
 
@@ -43,7 +42,6 @@ class Walker:
 
     Args:
         parts: What it is made of.
-        skeleton: Bodies and joints; names and order of the coordinates.
         model: Rigid bodies in Pinocchio.
         rigid_body: The same as CasADi functions.
         values: Every named number by address [SI].
@@ -54,7 +52,6 @@ class Walker:
 
     patient: Patient
     parts: Parts
-    skeleton: Skeleton
     model: pin.Model
     rigid_body: RigidBodyFunctions
     values: Mapping[str, float]
@@ -65,6 +62,11 @@ class Walker:
     def __repr__(self) -> str:
         """Return who walks, and with what."""
         return f"Walker({self.patient.id!r}, {self.condition!r}, {self.total_mass:.1f} kg)"
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """Bodies and joints: names and order of the coordinates."""
+        return self.parts.skeleton
 
     @property
     def backend(self) -> str:
@@ -155,11 +157,20 @@ class Walker:
         bodies = [n.address for n in self.parts.body_numbers]
         if all(values[address] == self.values[address] for address in bodies):
             return changed
-        model = pinocchio_model(self.patient, self.condition, self.published, values)
+        model = pinocchio_model(self.patient, self.condition, self.published, values, self.skeleton)
         parameters = self.rigid_body.parameters_for(model, changed.shapes)
         return replace(
             changed, model=model, rigid_body=replace(self.rigid_body, parameters=parameters)
         )
+
+    @cached_property
+    def flat_footed(self) -> Walker:
+        """The walker as recordings know it, whose feet are in one piece."""
+        if not self.parts.toes:
+            return self
+        parts = replace(self.parts, toes=False)
+        walker = walker_of(self.patient, parts, self.published, self.backend)
+        return walker.with_values({n.address: self.values[n.address] for n in parts.numbers})
 
     @property
     def total_mass(self) -> float:
@@ -318,33 +329,32 @@ class Walker:
         q, v and tau are of shape (m, 10); `terms` evaluates `dynamics_terms` at m points, if not
         the function itself.
         """
-        contact = phase if isinstance(phase, ContactPhase) else phase_named(phase)
-        active = self.pattern.indices(contact)
-        count, n, size = len(q), self.skeleton.size, len(active)
+        contact = self.pattern.phase(phase)
+        held, soft = map(self.pattern.indices, (contact.rigid, contact.yielding))
+        count, n, size = len(q), self.skeleton.size, len(held)
         mass, bias, jacobian, drift, places = map(
             np.asarray, (terms or self.dynamics_terms)(q.T, v.T)
         )
         # of m instants CasADi sets the matrices side by side
-        jacobian = jacobian.reshape(-1, count, n)[active].swapaxes(0, 1)
+        jacobian = jacobian.reshape(-1, count, n).swapaxes(0, 1)
+        forces, pushed = np.zeros((count, len(self.pattern.forces))), tau - bias.T
+        if soft:
+            velocity = np.einsum("ijk,ik->ij", jacobian, v)
+            forces[:, soft] = self._ground_forces(places.T, velocity)
+            pushed = pushed + np.einsum("ij,ijk->ik", forces[:, soft], jacobian[:, soft])
         matrix = np.zeros((count, n + size, n + size))
         matrix[:, :n, :n] = mass.reshape(n, count, n).swapaxes(0, 1)
-        matrix[:, n:, :n] = jacobian
-        matrix[:, :n, n:] = -jacobian.swapaxes(1, 2)
-        if contact.compliant:
-            velocity = np.einsum("ijk,ik->ij", jacobian, v)
-            forces = self._ground_forces(places.T, velocity)
-            pushed = tau - bias.T + np.einsum("ij,ijk->ik", forces[:, active], jacobian)
-            return np.linalg.solve(matrix[:, :n, :n], pushed[..., None])[..., 0], forces
-        right = np.hstack([tau - bias.T, -drift[active].T])[..., None]
+        matrix[:, n:, :n] = jacobian[:, held]
+        matrix[:, :n, n:] = -jacobian[:, held].swapaxes(1, 2)
+        right = np.hstack([pushed, -drift[held].T])[..., None]
         solution = np.linalg.solve(matrix, right)[..., 0]
-        forces = np.zeros((count, len(self.pattern.forces)))
-        forces[:, active] = solution[:, n:]
+        forces[:, held] = solution[:, n:]
         return solution[:, :n], forces
 
     def _ground_forces(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """Return the forces on soles that give way [N] at m instants, (m, 4).
+        """Return the forces on places that give way [N] at m instants, two columns each.
 
-        Of places and velocities of the contacts, (m, 4) each [m, m/s].
+        Of places and velocities of all contacts, (m, 2 k) each [m, m/s].
         """
         known = self.values, self.weight, self.friction
         forces = [
@@ -352,6 +362,7 @@ class Walker:
                 place, position[:, 2 * i + 1], (velocity[:, 2 * i], velocity[:, 2 * i + 1]), *known
             )
             for i, place in enumerate(self.pattern.points)
+            if place in self.pattern.yielding
         ]
         return np.concatenate(forces).T
 
@@ -367,10 +378,15 @@ class Walker:
 
     def foot_points(self, q: Any) -> np.ndarray:
         """Return right heel, right toe, left heel, left toe of q (10,): forward, up [m], (4, 2)."""
+        frames = self.frames(q)
+        return np.array([frames[point.name] for point in POINTS])
+
+    def frames(self, q: Any) -> dict[str, np.ndarray]:
+        """Return where all frames are in q: forward, up [m], by name."""
         data = self.model.createData()
         pin.framesForwardKinematics(self.model, data, _vector(q, self.skeleton.size, "q"))
-        frames = [self.model.getFrameId(point.name) for point in POINTS]
-        return np.array([data.oMf[frame].translation[[0, 2]] for frame in frames])
+        pairs = zip(self.model.frames, data.oMf, strict=True)
+        return {frame.name: place.translation[[0, 2]].copy() for frame, place in pairs}
 
     @cached_property
     def contact_motion(self) -> ca.Function:
@@ -410,6 +426,7 @@ def build_walker(
     feet: Feet = "points",
     contact: Contact = HEEL_TOE,
     further: Sequence[str] = (),
+    toes: bool = False,
 ) -> Walker:
     """Return the walking model of a patient; see `Parts` and `walker_of`.
 
@@ -422,7 +439,8 @@ def build_walker(
         raise InputError(
             f"there is no condition {condition!r}", allowed=" or ".join(map(repr, CONDITIONS))
         )
-    parts = Parts(condition, tissue, feet, contact, tuple(further), patient.braced(condition))
+    braced = patient.braced(condition)
+    parts = Parts(condition, tissue, feet, contact, tuple(further), braced, toes)
     return walker_of(patient, parts, published, backend, free)
 
 
@@ -450,13 +468,12 @@ def walker_of(
     """
     if parts.condition == "orthosis":
         patient.require_orthosis()
-    model = pinocchio_model(patient, parts.condition, published)
+    model = pinocchio_model(patient, parts.condition, published, skeleton=parts.skeleton)
     values = {n.address: n.value_for(patient) for n in parts.numbers}
-    frames, shapes = [point.name for point in POINTS], [values[n.address] for n in parts.shapes]
+    frames, shapes = [p.name for p in parts.frames], [values[n.address] for n in parts.shapes]
     return Walker(
         patient=patient,
         parts=parts,
-        skeleton=PLANAR_WALKER,
         model=model,
         rigid_body=rigid_body_functions(model, frames, backend, shapes, parts.soles),
         values=values,

@@ -38,6 +38,7 @@ from pathwalker_cli.patient.proportions import (
     HEEL_SHARE,
     SOURCE,
     TOE_SHARE,
+    TOES_SHARE,
     default_length,
 )
 
@@ -246,6 +247,10 @@ class Patient(YamlModel):
             for side, foot in feet.items()
         }
         return Sides[FootPoints](**points)
+
+    def toes_length(self, side: str) -> float:
+        """Return how far the toes reach in front of the ball of the foot [m]."""
+        return self.number(f"toes.length.{side}", TOES_SHARE * self.length("foot", side))
 
     def cuff_height(self, side: str) -> float:
         """Return how far above the hinge the cuff of the orthosis presses on the leg [m]."""

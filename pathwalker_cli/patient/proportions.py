@@ -29,6 +29,9 @@ _LUMBAR: Final = 0.04
 _BALL_SHARE: Final = 0.73
 """Heel to ball of the foot, as a share of the length of the foot."""
 
+TOES_SHARE: Final = 1.0 / _BALL_SHARE - 1.0
+"""Toes in front of the ball, as a share of the model's foot, which ends there."""
+
 ANKLE_HEIGHT: Final = 0.039
 """Height of the ankle above the sole, fraction of standing height."""
 

@@ -15,6 +15,7 @@ from pathwalker_cli.inverse.figures import joint_torque_figure, name_figure
 from pathwalker_cli.inverse.trial import Trial
 from pathwalker_cli.report.content import Drawing, Section, Shape
 from pathwalker_cli.report.runs import ReportRun
+from pathwalker_cli.stride.figures.curves import TOES
 from pathwalker_cli.stride.figures.stick_figures import walks_figure
 from pathwalker_cli.stride.figures.style import STYLE
 
@@ -40,8 +41,10 @@ def curve_section(runs: Sequence[ReportRun]) -> Section:
             f"{curve.name}, {curve.label} over the gait cycle, right and left: {names}",
             "panel",
         )
-        for row in ROWS
-        for curve in row
+        for curve in (
+            *(curve for row in ROWS for curve in row),
+            *([TOES] if any(trace.gait.walker.parts.toes for trace in shown) else []),
+        )
     ]
     drawings += [
         drawn(

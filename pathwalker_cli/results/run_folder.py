@@ -377,4 +377,10 @@ def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
             where=f"--warm-start {folder}",
             allowed="fits start from fits, predictions from predictions",
         )
+    if run.config.model.toes != config.model.toes:
+        raise DataError(
+            f"is a run of feet {'with' if run.config.model.toes else 'without'} toes",
+            where=f"--warm-start {folder}",
+            allowed=f"model.toes {str(config.model.toes).lower()}, as in the config",
+        )
     return run

@@ -10,9 +10,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import (
-    COORDINATES,
     GENERATORS,
-    ROOT,
     SIDES,
     SUFFIX,
     coordinate_unit,
@@ -34,10 +32,11 @@ Column = tuple[str, str, np.ndarray]
 
 def states_table(series: GaitSeries) -> Trajectory:
     """Return coordinates, velocities and activations over time."""
+    names = series.walker.skeleton.coordinates
     return _table(
         series,
-        _columns(COORDINATES, "", coordinate_unit, series.q),
-        _columns(COORDINATES, "_velocity", velocity_unit, series.v),
+        _columns(names, "", coordinate_unit, series.q),
+        _columns(names, "_velocity", velocity_unit, series.v),
         _columns(GENERATORS, "_activation", "1", series.activation),
     )
 
@@ -70,8 +69,9 @@ def forces_table(series: GaitSeries) -> Trajectory:
 def torques_table(series: GaitSeries) -> Trajectory:
     """Return torques of generators, orthoses and tissue, and the sum per joint over time."""
     orthoses = [f"orthosis_{SUFFIX[side]}" for side in SIDES]
-    joints = [name for name in COORDINATES if name not in ROOT]
-    net = series.net_torque[:, [COORDINATES.index(name) for name in joints]]
+    skeleton = series.walker.skeleton
+    joints = [name for name in skeleton.coordinates if name not in skeleton.root]
+    net = series.net_torque[:, [skeleton.index(name) for name in joints]]
     return _table(
         series,
         _columns(GENERATORS, "_torque", "N m", series.muscle_torque),

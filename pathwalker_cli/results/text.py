@@ -10,8 +10,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from pathwalker_cli.conventions import COORDINATES, SIDES, STIFFNESSES, SUFFIX, to_degrees
+from pathwalker_cli.conventions import SIDES, STIFFNESSES, SUFFIX, to_degrees
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, Shortfall
+from pathwalker_cli.model.skeleton import TOED_WALKER
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import OrthosisData
 from pathwalker_cli.stride.measures import TABLES, expanded, measure_of, measures_in
@@ -152,7 +153,7 @@ def summary_renderable(
     return Group(table, *(Text.assemble(("note: ", "yellow"), note) for note in notes))
 
 
-_ANGLES: Final = frozenset(COORDINATES[2:])
+_ANGLES: Final = frozenset(TOED_WALKER.angles)
 _UNITS: Final = {"duration": "s", "walking_speed": "m/s", "distance": "m"}
 
 _MET: Final = 1e-6

@@ -23,6 +23,7 @@ from pathwalker_cli.conventions import (
     ROOT,
     SIDES,
     SUFFIX,
+    TRANSLATIONS,
     Side,
 )
 from pathwalker_cli.installed import load_installed
@@ -74,8 +75,8 @@ def _crouch(stride: Stride, side: Side) -> tuple[float, float]:
 
 
 def _joint_range(stride: Stride) -> dict[str, tuple[float, float]]:
-    angles = stride.q[:, 2:].T
-    return {n: (a.min(), a.max()) for n, a in zip(COORDINATES[2:], angles, strict=True)}
+    known = zip(stride.walker.skeleton.coordinates, stride.q.T, strict=False)
+    return {name: (q.min(), q.max()) for name, q in known if name not in TRANSLATIONS}
 
 
 def _peak_vertical_force(stride: Stride, side: Side) -> float:
@@ -99,9 +100,8 @@ def _peak_moments(stride: Stride, scale: float = 1.0) -> dict[str, float]:
     """Return the net moment of largest magnitude of every joint, with its sign [N m]."""
     torque = stride.known("net_torque")
     row = np.argmax(np.abs(torque), axis=0)
-    return {
-        name: torque[row[i], i] / scale for i, name in enumerate(COORDINATES) if name not in ROOT
-    }
+    largest = zip(stride.walker.skeleton.coordinates, torque[row, range(row.size)], strict=False)
+    return {name: moment / scale for name, moment in largest if name not in ROOT}
 
 
 def _work(stride: Stride, muscles: bool, sign: float) -> float:

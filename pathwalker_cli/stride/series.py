@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 
-from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.model.elements.muscle import excitation_from_rate
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
@@ -176,7 +175,7 @@ def _phase_series(walker: Walker, phase: PhaseMotion) -> dict[str, np.ndarray]:
     """Return the columns of one phase at its collocation points."""
     fractions = phase.point_fractions.ravel()
     n, count = walker.skeleton.size, fractions.size
-    active = walker.pattern.indices(phase_named(phase.name))
+    active = walker.pattern.indices(walker.pattern.phase(phase.name).forces)
     states = phase.inner_states.reshape(count, -1)
     algebraic = phase.algebraic.reshape(count, -1)
     force = np.zeros((count, len(walker.pattern.forces)))

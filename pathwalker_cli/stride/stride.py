@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Final, Literal
 
 import numpy as np
-import pinocchio as pin
 from scipy.integrate import trapezoid
 
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, SIDES, SUFFIX, Side
@@ -97,7 +96,7 @@ class Stride(Sampled):
     def __post_init__(self) -> None:
         """Check the shapes."""
         n, columns = self.time.size, {"muscle_torque": len(GENERATORS), "orthosis_torque": 2}
-        columns |= dict.fromkeys(("q", "v", "net_torque"), len(COORDINATES))
+        columns |= dict.fromkeys(("q", "v", "net_torque"), self.walker.skeleton.size)
         pattern = self.walker.pattern
         columns |= {"activation": len(GENERATORS), "point_force": len(pattern.forces)}
         checked = [(name, getattr(self, name), width) for name, width in columns.items()]
@@ -315,13 +314,17 @@ def phase_stances(
 def stances_of(series: GaitSeries) -> dict[Side, tuple[float, float]]:
     """Return foot strike and toe-off of each side [s]; of what gives way, from its load.
 
-    Toe-off is then the end of the side's own step, and the strike where the load that lasts until
-    toe-off passes `LOADED`.
+    Toe-off of compliant soles is the end of the side's own step, and the strike where the load that
+    lasts until toe-off passes `LOADED`.  Toes that a joint carries push on when the ball has left
+    the ground: they are off where they bear less than that.
     """
     pattern = series.walker.pattern
     switching = switching_times(pattern, series.motion)
     if not series.walker.parts.compliant:
-        return phase_stances(pattern, np.diff(switching))
+        spans = phase_stances(pattern, np.diff(switching))
+        if not series.walker.parts.toes:
+            return spans
+        return {side: (on, _unloaded(series, side, off)) for side, (on, off) in spans.items()}
     duration, found = series.duration, {}
     for side, toe_off in zip(SIDES, switching[1:].tolist(), strict=True):
         since = (series.time - toe_off) % duration
@@ -336,6 +339,14 @@ def stances_of(series: GaitSeries) -> dict[Side, tuple[float, float]]:
             strike = (toe_off + begin + share * (end - begin)) % duration
         found[side] = strike, toe_off if toe_off > strike else toe_off + duration
     return found
+
+
+def _unloaded(series: GaitSeries, side: Side, since: float) -> float:
+    """Return the first instant from another one on at which a foot bears less than `LOADED` [s]."""
+    later = (series.time - since) % series.duration
+    order = np.argsort(later, kind="stable")
+    light = series.vertical_force(side)[order] < LOADED
+    return since + float(later[order][int(np.argmax(light))])
 
 
 @dataclass(frozen=True)
@@ -378,10 +389,12 @@ def contacts(walker: Walker, phase: tuple[str, ...], force: np.ndarray | None) -
         phase: Name of the phase at each instant.
         force: Forces in the order of the pattern [N], shape (n, 2 k); needed of what gives way.
     """
-    if walker.parts.compliant and force is not None:
-        return np.asarray(force[:, 1::2] > LOADED)
-    points = {name: phase_named(name).points for name in set(phase)}
-    return np.array([[point in points[name] for point in walker.pattern.points] for name in phase])
+    pattern, points = walker.pattern, {name: phase_named(name).points for name in set(phase)}
+    on = np.array([[point in points[name] for point in pattern.points] for name in phase])
+    if force is not None and pattern.yielding:
+        soft = [pattern.points.index(point) for point in pattern.yielding]
+        on[:, soft] = force[:, pattern.upward(pattern.yielding)] > LOADED
+    return on
 
 
 def toe_bearing(stride: Stride, side: Side) -> np.ndarray:
@@ -410,19 +423,16 @@ def centre_of_pressure(series: GaitSeries, side: Side) -> np.ndarray:
 
 
 def body_points(walker: Walker, q: np.ndarray) -> dict[str, np.ndarray]:
-    """Return positions of joints, heels, toes, neck and head (x, z) [m].
+    """Return positions of joints, heels, toes, neck and head (x, z) [m], of toes also their tips.
 
     Args:
         walker: Who walks.
         q: Generalised coordinates, shape (10,).
     """
-    data = walker.model.createData()
-    pin.framesForwardKinematics(walker.model, data, np.asarray(q, dtype=float))
-    legs = [f"{name}_{s}" for name in ("hip", "knee", "ankle", "heel", "toe") for s in "rl"]
-    points = {
-        name: data.oMf[walker.model.getFrameId(name)].translation[[0, 2]].copy()
-        for name in (*legs, "lumbar", "head")
-    }
+    frames = walker.frames(q)
+    ends = ("hip", "knee", "ankle", "heel", "toe", *(["tip"] if walker.parts.toes else []))
+    legs = [f"{name}_{s}" for name in ends for s in "rl"]
+    points = {name: frames[name] for name in (*legs, "lumbar", "head")}
     points["neck"] = points.pop("head")
     points["head"] = points["neck"] + 0.25 * (points["neck"] - points["lumbar"])
     return points

@@ -125,7 +125,7 @@ def second_engine_residual(series: GaitSeries) -> float:
             forward, _, upward = place.arm
             rows = jacobian[[0, 2]] + np.outer((upward, -forward), jacobian[4])
             needed = needed - rows.T @ force
-            if walker.parts.compliant:
+            if point in walker.pattern.yielding:
                 forward, up = (rows @ v).tolist()
                 known = walker.values, walker.weight, walker.friction
                 law = ground_force(point, place.position[2], (forward, up), *known)

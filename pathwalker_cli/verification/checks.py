@@ -213,7 +213,7 @@ def _dynamics(run: Run, series: GaitSeries, numbers: dict[str, Any]) -> Iterator
         yield Check(f"re-integrated {name}", error if refined else None, limit, unit, note)
     balances = balance(series)
     work, ground = "work of the ground", balances.contact_work
-    if walker.parts.compliant:
+    if walker.pattern.yielding:
         work, ground = "ground that gives work", max(0.0, -balances.ground_loss)
     shares = (
         ("work against energy", balances.energy / balances.work_scale, _ENERGY),

@@ -118,6 +118,18 @@ class Topology:
         )
 
     @property
+    def depth_first(self) -> bool:
+        """Whether the joints that each one moves follow it at once."""
+        above = [0]  # joints that may still get a child
+        for number, parent in enumerate(self.parents, 1):
+            while above[-1] != parent:
+                above.pop()
+                if not above:
+                    return False
+            above.append(number)
+        return True
+
+    @property
     def body_names(self) -> tuple[str, ...]:
         """Names of the parameters that a back end knows, e.g. "hip_r.mass", "heel_r.position.x"."""
         of_joints = (f"{joint}.{entry}" for joint in self.joints for entry in JOINT_ENTRIES)
@@ -128,8 +140,9 @@ class Topology:
     def parameter_names(self) -> tuple[str, ...]:
         """Names of all parameters in order: `body_names`, then e.g. "heel_r.radius"."""
         radii = (f"{point}.{RADIUS}" for point in self.points)
-        bodies = (self.joints[self.point_joints[group[0]] - 1] for group in self.contacts)
-        rounded = tuple(f"{body}.{ROUNDNESS}" for body in bodies) if self.soles else ()
+        soles = (group for group in self.contacts if len(group) > 1)
+        bodies = (self.joints[self.point_joints[group[0]] - 1] for group in soles)
+        rounded = (f"{body}.{ROUNDNESS}" for body in bodies)
         return (*self.body_names, *radii, *rounded)
 
     @property
@@ -283,6 +296,8 @@ def touching(topology: Topology, fixed: Mapping[str, ca.Function]) -> dict[str, 
     symbols["theta"] = theta = ca.SX.sym("theta", len(topology.parameter_names))
     body = {**symbols, "theta": theta[:count]}
     values = {name: fixed[name](*(body[a] for a in given)) for name, given in SIGNATURES.items()}
+    if not topology.depth_first:  # Pinocchio's composite bodies take columns side by side
+        values["mass_matrix"] = ca.jacobian(values["inverse_dynamics"], symbols["vdot"])
     radius, roundness = theta[count : count + n], theta[count + n :]
     turns = ca.SX(ca.sparsify(ca.DM(topology.turns)))
     turn = turns @ symbols["q"]
@@ -293,7 +308,7 @@ def touching(topology: Topology, fixed: Mapping[str, ca.Function]) -> dict[str, 
     rows: dict[str, list[ca.SX]] = {name: [] for name in values if name.startswith("point")}
     for number, group in enumerate(topology.contacts):
         first, spin, shift = group[0], turns[group[0], :], low[group[0]]
-        if topology.soles:
+        if len(group) > 1:
             length = ca.norm_2(ends[:, group[-1]] - ends[:, first])
             touched = ca.horzcat(*(places[:, i] + low[i] - places[:, first] for i in group))
             shift = _blended(touched, 4.0 * roundness[number] / length)

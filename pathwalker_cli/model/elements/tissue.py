@@ -43,14 +43,14 @@ _EXAMINATION: Final = {
 with the knee flexed follows from the curves' own coupling at 90 degrees."""
 
 
-def _size(patient: Patient) -> float:
+def size_beside_adults(patient: Patient) -> float:
     """Return how large passive torques are beside those of adults: as mass times height."""
     return patient.body_mass * patient.height / _ADULT
 
 
 SHARED: Final = (
-    Number("tissue.size", "passive_size", "passive torques beside adults'", "1", None, _size,
-           "body mass times height, Riener and Edrich (1999)"),
+    Number("tissue.size", "passive_size", "passive torques beside adults'", "1", None,
+           size_beside_adults, "body mass times height, Riener and Edrich (1999)"),
     Number("tissue.damping", "joint_damping", "damping of leg joints", "N m s/rad", None,
            DAMPING, "see model.choices"),
 )  # fmt: skip

@@ -125,6 +125,12 @@ def _angle(joint: str, name: str, label: str) -> CycleCurve:
     return CycleCurve(f"angle_{joint}", name, label, raw, lambda _: factor, midline, not knee, knee)
 
 
+def _toe_extension(stride: Stride, side: Side) -> np.ndarray:
+    if not stride.walker.parts.toes:
+        raise NotKnownError("toes")
+    return -stride.column(f"mtp_{SUFFIX[side]}")[:, None]
+
+
 def _force(key: str, axis: int, name: str) -> CycleCurve:
     def raw(stride: Stride, side: Side) -> np.ndarray:
         return stride.foot_force(side)[:, [axis]]
@@ -174,6 +180,14 @@ ANGLES: Final = (
     _angle("ankle", "ankle", "dorsiflexion [deg]"),
     _angle("lumbar", "trunk", "forward lean [deg]"),
 )
+TOES: Final = CycleCurve(
+    "angle_mtp",
+    "toes",
+    "extension [deg]",
+    _toe_extension,
+    lambda _: float(to_degrees(1.0)),
+)
+"""Of walkers whose toes a joint carries; no recording has it."""
 FORCES: Final = (
     _force("force_vertical", 1, "vertical force"),
     _force("force_forward", 0, "fore-aft force"),

@@ -12,7 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.markers import TICKDOWN
 
-from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side
+from pathwalker_cli.conventions import GENERATORS, LEG_JOINTS, SIDES, SUFFIX, Side, to_degrees
+from pathwalker_cli.errors import InputError
+from pathwalker_cli.model.contact import TIPS
 from pathwalker_cli.stride.figures import style
 from pathwalker_cli.stride.figures.curves import (
     ANGLES,
@@ -90,6 +92,38 @@ def support_changes(stride: Stride, side: Side) -> np.ndarray:
     changed = (foot != np.roll(foot, -1, axis=0)).any(axis=1)
     later = (stride.time[changed] - strike) % stride.duration
     return np.sort(100.0 * later / stride.duration)
+
+
+def toe_joints(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return angle and torque of the toe joints, and the load of the tips, over the gait cycle.
+
+    Extension and the torque that resists it are positive.
+
+    Raises:
+        InputError: If no joint carries the toes.
+    """
+    walker = series.walker
+    if not walker.parts.toes:
+        raise InputError("these feet have no toe joints", allowed="model.toes true")
+    fig = style.new_figure(2.9)
+    panels = fig.subplots(2, 2).ravel()
+    tips = dict(zip(SIDES, series.force[:, walker.pattern.upward(TIPS)].T, strict=True))
+    for side in SIDES:
+        toe = f"mtp_{SUFFIX[side]}"
+        _draw_side(panels[0], series, side, -to_degrees(series.column(toe)))
+        torque = series.net_torque[:, walker.skeleton.index(toe)]
+        _draw_side(panels[1], series, side, torque / walker.total_mass)
+        _draw_side(panels[2], series, side, 100.0 * tips[side] / walker.weight)
+    titles = {"Toes, extension +": "extension [deg]", "Toe joint, flexing +": "moment [N m/kg]",
+              "Tips of the toes": "force [% body weight]"}  # fmt: skip
+    for ax, (title, label) in zip(panels, titles.items(), strict=False):
+        style.dress(ax, title, y=label)
+        style.zero_line(ax)
+        for side in SIDES:
+            style.toe_off_line(ax, own_cycle(series, side))
+        style.percent_axis(ax)
+    style.legend_panel(panels[-1], [*style.side_handles(), style.events_handle()])
+    return fig
 
 
 def ground_forces(series: GaitSeries, reference: Reference | None = None) -> Figure:

@@ -17,6 +17,7 @@ from pathwalker_cli.stride.figures.cycles import (
     ground_forces,
     joint_angles,
     joint_moments,
+    toe_joints,
 )
 from pathwalker_cli.stride.figures.stick_figures import stick_figures
 from pathwalker_cli.stride.figures.style import STYLE
@@ -36,6 +37,7 @@ FIGURES: Final[dict[str, Callable[[GaitSeries, Reference | None], Figure]]] = {
     "activations": activations,
     "ankle_torque": ankle_torque,
     "orthosis_curves": orthosis_curves,
+    "toe_joints": toe_joints,
 }
 """Names of the figures and what makes them."""
 
@@ -48,8 +50,9 @@ _METADATA: Final[dict[str, dict[str, str | None]]] = {
 
 def figure_names(series: GaitSeries) -> tuple[str, ...]:
     """Return the figures that make sense for a stride: no orthosis curve when barefoot."""
-    worn = series.walker.device.worn
-    return tuple(name for name in FIGURES if worn or name != "orthosis_curves")
+    walker = series.walker
+    special = {"orthosis_curves": walker.device.worn, "toe_joints": walker.parts.toes}
+    return tuple(name for name in FIGURES if special.get(name, True))
 
 
 def make_figure(name: str, series: GaitSeries, reference: Reference | None = None) -> Figure:

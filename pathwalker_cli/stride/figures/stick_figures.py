@@ -122,6 +122,8 @@ def _draw_body(ax: Axes, points: dict[str, np.ndarray], braced: Sequence[Side]) 
         _draw_chain(ax, points, ("lumbar", f"hip_{s}", f"knee_{s}", f"ankle_{s}"), look)
         foot = (f"ankle_{s}", f"heel_{s}", f"toe_{s}", f"ankle_{s}")
         _draw_chain(ax, points, foot, look | {"linewidth": 0.8})
+        if f"tip_{s}" in points:
+            _draw_chain(ax, points, (f"toe_{s}", f"tip_{s}"), look | {"linewidth": 0.8})
         if side in braced:
             calf = 0.25 * points[f"ankle_{s}"] + 0.75 * points[f"knee_{s}"]
             shell = {"calf": calf, **points}
