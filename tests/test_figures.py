@@ -5,7 +5,10 @@ from __future__ import annotations
 import ast
 import io
 from collections.abc import Iterator
+from os import environ
 from pathlib import Path
+from subprocess import CompletedProcess, run
+from sys import executable
 from typing import Any
 
 import matplotlib as mpl
@@ -78,3 +81,33 @@ def test_a_wide_figure_is_measured_at_the_width_of_a_page() -> None:
         figure.set_figwidth(2.0 * PAGE)
         figure.text(0.5, 0.5, "words", fontsize=8.0)
     assert complaints(figure) == ["'words' is 4.0 pt"]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "right"), [("", "#0072B2"), ("blue", "#0072B2"), ("green", "#009E73")]
+)
+def test_a_laboratory_chooses_the_colour_of_the_right_side(chosen: str, right: str) -> None:
+    shown = _style_with(chosen)
+    assert shown.returncode == 0, shown.stderr
+    assert shown.stdout.split() == [right, "#D55E00"]
+
+
+def test_another_colour_of_the_right_side_is_refused() -> None:
+    refused = _style_with("red")
+    assert refused.returncode == 1
+    assert "PATHWALKER_RIGHT: there is no colour 'red' for the right side" in refused.stderr
+
+
+def _style_with(chosen: str) -> CompletedProcess[str]:
+    code = (
+        "from pathwalker_cli.stride.figures.style import LINE_COLOUR, FORCE_COLOUR\n"
+        "assert FORCE_COLOUR not in LINE_COLOUR.values()\n"
+        "print(*LINE_COLOUR.values())"
+    )
+    return run(
+        [executable, "-c", code],
+        env={**environ, "PATHWALKER_RIGHT": chosen},
+        capture_output=True,
+        text=True,
+        check=False,
+    )

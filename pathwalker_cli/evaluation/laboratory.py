@@ -1,7 +1,7 @@
 """Curves as gait laboratories print them: a small panel per quantity, one side over the other.
 
-Right is blue and round, left is red and square, whatever is worn; the last gait is solid, those
-before it are broken lines.
+Right is blue (or green) and round, left is red and square, whatever is worn; the last gait is
+solid, those before it are broken lines.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def ankle_panel(shown: Sequence[Trace], side: Side) -> Figure:
 def legend_panel(shown: Sequence[Trace]) -> Figure:
     """Return the legend of all panels, as large as one."""
     fig = style.new_figure(_HEIGHT, style.PANEL, laid_out=False)
-    blue = style.LINE_COLOUR["right"]
+    right = style.LINE_COLOUR["right"]
     handles: list[Artist] = [
         style.entry(side, color=style.LINE_COLOUR[side], marker=style.MARKER[side], markersize=3)
         for side in SIDES
@@ -114,7 +114,7 @@ def legend_panel(shown: Sequence[Trace]) -> Figure:
     behind = _behind(shown)
     if behind is not None:
         label = "recorded range" if len(shown) == 1 else f"recorded, {behind[0]}"
-        handles.append(Patch(facecolor=blue, alpha=2.0 * _RECORDED, label=label))
+        handles.append(Patch(facecolor=right, alpha=2.0 * _RECORDED, label=label))
     speed = speed_class(shown[-1].gait).replace("_", " ")
     typical = f"typical children,\n{speed} speed, ± 1 SD"
     handles.append(Patch(facecolor=_TYPICAL, label=typical))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from typing import Any, Final, Literal
 
@@ -12,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pathwalker_cli.conventions import SIDES, Side
+from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.stride.stride import OwnCycle
 
 COLUMN: Final = 3.35
@@ -23,16 +25,35 @@ PANEL: Final = PAGE / 4.0
 TEXT: Final = 7.0
 """Size of all text [pt]; figures are printed as wide as they are drawn."""
 
-LINE_COLOUR: Final[dict[Side, str]] = {"right": "#0072B2", "left": "#D55E00"}
-"""Blue and vermilion of the palette by Okabe and Ito, told apart with any colour vision."""
+_BLUE, _GREEN = "#0072B2", "#009E73"
+
+
+def _right_and_forces() -> tuple[str, str]:
+    """Return the colours of the right side, blue or green as laboratories have it, and of forces.
+
+    Raises:
+        ConfigError: If PATHWALKER_RIGHT is neither.
+    """
+    choices = {"blue": (_BLUE, _GREEN), "green": (_GREEN, _BLUE)}
+    chosen = os.environ.get("PATHWALKER_RIGHT") or "blue"
+    if chosen not in choices:
+        raise ConfigError(
+            f"there is no colour '{chosen}' for the right side", where="PATHWALKER_RIGHT",
+            allowed="blue or green",
+        )  # fmt: skip
+    return choices[chosen]
+
+
+_RIGHT, FORCE_COLOUR = _right_and_forces()
+"""Right side, and ground reaction forces that are drawn as arrows."""
+LINE_COLOUR: Final[dict[Side, str]] = {"right": _RIGHT, "left": "#D55E00"}
+"""With vermilion, of the palette by Okabe and Ito: told apart with any colour vision."""
 LINE_STYLE: Final[dict[Side, Literal["-", "--"]]] = {"right": "-", "left": "--"}
 """Right solid, left dashed: sides differ without colour too."""
 MARKER: Final[dict[Side, Literal["o", "s"]]] = {"right": "o", "left": "s"}
 """Right round, left square, for the same reason."""
 BODY_COLOUR: Final[dict[Side, str]] = {"right": "#222222", "left": "#8a8a8a"}
 """Legs of a drawn walker; trunk and head are as dark as the right leg."""
-FORCE_COLOUR: Final = "#009E73"
-"""Ground reaction forces that are drawn as arrows."""
 FORCE_LENGTH: Final = 0.6
 """Length of an arrow of one body weight, as a share of the pelvis height."""
 NEUTRAL: Final = "#555555"
