@@ -583,7 +583,7 @@ def test_the_smoke_solve_converges(smoke: Smoke) -> None:
     assert done.returncode == 0, done.stderr
     assert {path.name for path in folder.iterdir()} == ENTRIES - {"NOT_CONVERGED.txt", "recordings"}
     assert "status                        converged" in done.stdout
-    assert "tracking   iteration    0" in done.stderr
+    assert "first mesh iteration    0" in done.stderr
     assert "\x1b" not in done.stdout + done.stderr, "no colours off a terminal"
 
 
