@@ -57,8 +57,9 @@ def _ordered(value: tuple[float, float]) -> tuple[float, float]:
 def _no_number(value: Any) -> Any:
     """Refuse one number in place of a range, and say how a range prescribes it."""
     if isinstance(value, int | float) and not isinstance(value, bool):
-        mend = f"[{value:g}, {value:g}] prescribes {value:g}"
-        raise invalid(f"is {value:g}", allowed="a range [lower, upper]", mend=mend)
+        shown = f"{min(max(value, -1e99), 1e99):g}"  # an integer may be too large for a float
+        mend = f"[{shown}, {shown}] prescribes {shown}"
+        raise invalid(f"is {shown}", allowed="a range [lower, upper]", mend=mend)
     return value
 
 
