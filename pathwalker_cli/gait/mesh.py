@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from pathwalker_cli.config import MeshConfig
 from pathwalker_cli.gait import choices
-from pathwalker_cli.stride.verify import Reintegration
+from pathwalker_cli.model.walker import Walker
+from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.ocp.collocation import CollocationProgram
+from pathwalker_cli.ocp.cost_error import CostError, cost_error
+from pathwalker_cli.stride.verify import Reintegration, reintegrate
 
 
 def uniform(counts: np.ndarray | list[int]) -> tuple[np.ndarray, ...]:
@@ -79,3 +85,56 @@ def refined(
         ]
         result.append(np.concatenate([*pieces, [1.0]]))
     return tuple(result)
+
+
+class MeshJudge:
+    """Judges the meshes of solved stages: by an independent integrator, and by what they cost.
+
+    Args:
+        walker: Who walks.
+        config: What a mesh must reach.
+        seconds: Wall seconds by part of the solve; what judging takes is added to "verify".
+    """
+
+    def __init__(self, walker: Walker, config: MeshConfig, seconds: dict[str, float]) -> None:
+        self._walker, self._config, self._seconds = walker, config, seconds
+        self._estimated: tuple[NlpResult, CostError | None] | None = None
+
+    def errors(
+        self,
+        program: CollocationProgram,
+        result: NlpResult,
+        tolerance: float = choices.PROVING_TOLERANCE,
+    ) -> Reintegration:
+        """Return the errors of an independent integrator of this relative tolerance."""
+        began = time.perf_counter()
+        errors = reintegrate(self._walker, program.to_motion(result.unknowns), tolerance)
+        self._seconds["verify"] += time.perf_counter() - began
+        return errors
+
+    def accepts(self, errors: Reintegration) -> bool:
+        """Return whether the errors of an integrator are within what is allowed."""
+        return (
+            errors.worst_position <= self._config.position_tolerance
+            and errors.worst_velocity <= self._config.velocity_tolerance
+        )
+
+    def cost_error(self, program: CollocationProgram, result: NlpResult) -> CostError | None:
+        """Return what halving every interval would change the cost by, estimated once."""
+        if self._estimated is None or self._estimated[0] is not result:
+            began = time.perf_counter()
+            self._estimated = result, cost_error(program, result)
+            self._seconds["verify"] += time.perf_counter() - began
+        return self._estimated[1]
+
+    def costly(self, program: CollocationProgram, result: NlpResult) -> tuple[np.ndarray, ...]:
+        """Return which intervals have to be split for the cost; none where it cannot be told."""
+        none = tuple(np.zeros(len(mesh) - 1, bool) for mesh in program.meshes)
+        error = self.cost_error(program, result)
+        if error is None:
+            return none
+        allowed = self._config.cost_tolerance * abs(result.objective)
+        size = sum(np.abs(part).sum() for part in error.shares)
+        if abs(error.total) <= choices.COST_SURE * allowed and size <= choices.COST_SIZE * allowed:
+            return none
+        return costly(error.shares, allowed * (choices.COST_AIM if size > allowed else 1.0))

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.case import Case
-from pathwalker_cli.config import MeshConfig, StudyConfig
+from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import COORDINATES
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait import mesh as meshing
@@ -49,13 +49,12 @@ from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
 from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.collocation import CollocationProgram
-from pathwalker_cli.ocp.cost_error import CostError, cost_error
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import BoundTable, ProblemNumbers, Sample
 from pathwalker_cli.ocp.violations import active_bounds, largest_violations
 from pathwalker_cli.stride.series import gait_series
-from pathwalker_cli.stride.verify import Reintegration, reintegrate
+from pathwalker_cli.stride.verify import Reintegration
 
 StageObserver = Callable[[str, ProgressReport], None]
 EARLIER: Final = "earlier run"
@@ -80,7 +79,6 @@ class GaitSolver:
         default_factory=lambda: {"build": 0.0, "solve": 0.0, "verify": 0.0}
     )
     shortfall: Shortfall | None = field(default=None, init=False)
-    _estimated: tuple[NlpResult, CostError | None] | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         """Build walker, bounds and the blocks of the problem."""
@@ -94,6 +92,7 @@ class GaitSolver:
         if self.config.fits:
             self.bounds = recorded_durations(self.bounds, self._durations)
         self.blocks = gait_blocks(self.gait, self.config.mesh.degree)
+        self._judge = meshing.MeshJudge(self.walker, self.config.mesh, self.seconds)
         self.seconds["build"] += time.perf_counter() - began
 
     @property
@@ -299,7 +298,7 @@ class GaitSolver:
     def restored(self, result: NlpResult, meshes: tuple[np.ndarray, ...]) -> GaitSolution:
         """Return the solution that another process found on these meshes."""
         program = CollocationProgram(self.blocks, self.prediction, meshes)
-        return self._finish(program, result, self._errors(program, result), EARLIER)
+        return self._finish(program, result, self._judge.errors(program, result), EARLIER)
 
     def _on_first_mesh(self, motion: PhasedMotion, settings: IpoptSettings) -> Stage:
         """Predict on the first mesh; if that fails, by way of a motion that reserves help along."""
@@ -391,16 +390,16 @@ class GaitSolver:
         self, program: CollocationProgram, result: NlpResult, tolerance: float
     ) -> tuple[CollocationProgram, NlpResult, Reintegration]:
         """Refine the mesh until an independent integrator agrees and the cost stays."""
-        mesh, solver = self.config.mesh, self.config.solver
+        mesh, solver, judge = self.config.mesh, self.config.solver, self._judge
         for attempt in range(1, mesh.refinements + 1):
             if not result.converged or self._interrupted:
                 break
-            errors = self._errors(program, result, choices.MESHING_TOLERANCE)
-            costly = self._costly(program, result)
+            errors = judge.errors(program, result, choices.MESHING_TOLERANCE)
+            costly = judge.costly(program, result)
             settled = tolerance <= solver.tolerance and not any(part.any() for part in costly)
-            if settled and _within(errors, mesh):
-                errors = self._errors(program, result)
-                if _within(errors, mesh):
+            if settled and judge.accepts(errors):
+                errors = judge.errors(program, result)
+                if judge.accepts(errors):
                     return program, result, errors
             share = choices.EAGER_SHARE if attempt >= choices.EAGER_ROUND else 1.0
             meshes = meshing.refined(program.meshes, errors, costly, mesh, share)
@@ -408,7 +407,7 @@ class GaitSolver:
             name, before = f"refined {attempt}", (program, result)
             program, result = self._refined(name, start, before, tolerance)
             tolerance = solver.tolerance
-        return program, result, self._errors(program, result)
+        return program, result, judge.errors(program, result)
 
     def _refined(self, name: str, start: PhasedMotion, before: Stage, tolerance: float) -> Stage:
         """Solve on a refined mesh from the last solution; without multipliers if that fails."""
@@ -421,47 +420,16 @@ class GaitSolver:
         far = self.settings(solver.tolerance, solver.warm_barrier)
         return self.stage(f"{name} again", start, self.prediction, far)
 
-    def _errors(
-        self,
-        program: CollocationProgram,
-        result: NlpResult,
-        tolerance: float = choices.PROVING_TOLERANCE,
-    ) -> Reintegration:
-        """Return the errors of an independent integrator of this relative tolerance."""
-        began = time.perf_counter()
-        errors = reintegrate(self.walker, program.to_motion(result.unknowns), tolerance)
-        self.seconds["verify"] += time.perf_counter() - began
-        return errors
-
-    def _costly(self, program: CollocationProgram, result: NlpResult) -> tuple[np.ndarray, ...]:
-        """Return which intervals have to be split for the cost; none where it cannot be told."""
-        error = self._cost_error(program, result)
-        if error is None:
-            return tuple(np.zeros(len(mesh) - 1, bool) for mesh in program.meshes)
-        allowed = self.config.mesh.cost_tolerance * abs(result.objective)
-        size = sum(np.abs(part).sum() for part in error.shares)
-        if abs(error.total) <= choices.COST_SURE * allowed and size <= choices.COST_SIZE * allowed:
-            return tuple(np.zeros(part.shape, bool) for part in error.shares)
-        return meshing.costly(error.shares, allowed * (choices.COST_AIM if size > allowed else 1.0))
-
-    def _cost_error(self, program: CollocationProgram, result: NlpResult) -> CostError | None:
-        """Return what halving every interval would change the cost by, estimated once."""
-        if self._estimated is None or self._estimated[0] is not result:
-            began = time.perf_counter()
-            self._estimated = result, cost_error(program, result)
-            self.seconds["verify"] += time.perf_counter() - began
-        return self._estimated[1]
-
     def _finish(
         self, program: CollocationProgram, result: NlpResult, errors: Reintegration, start: str
     ) -> GaitSolution:
-        mesh, status = self.config.mesh, result.status
-        if result.converged and mesh.refinements and not _within(errors, mesh):
+        judge, status = self._judge, result.status
+        if result.converged and self.config.mesh.refinements and not judge.accepts(errors):
             status = "the mesh does not reach the accuracy asked for"
         if self.shortfall is not None and self.shortfall.too_weak:
             status = TOO_WEAK
         motion = self.whole_stride(program, result)
-        error = self._cost_error(program, result) if result.converged else None
+        error = judge.cost_error(program, result) if result.converged else None
         return GaitSolution(
             case=self.case,
             walker=self.walker.with_parameters(motion.parameters),
@@ -481,14 +449,6 @@ class GaitSolver:
             seconds=dict(self.seconds),
             shortfall=self.shortfall,
         )
-
-
-def _within(errors: Reintegration, mesh: MeshConfig) -> bool:
-    """Return whether the errors on a mesh are those that a config allows."""
-    return (
-        errors.worst_position <= mesh.position_tolerance
-        and errors.worst_velocity <= mesh.velocity_tolerance
-    )
 
 
 def solve_study(
