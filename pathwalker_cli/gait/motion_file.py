@@ -158,7 +158,7 @@ def _shapes(phase: PhaseMotion) -> dict[str, tuple[int, ...]]:
     """Return the shapes that belong to the mesh and the degree of a phase."""
     contact, nodes = phase_named(phase.name), max(2, phase.mesh.size)
     n = len(COORDINATES)
-    if phase.states.shape[-1] == 2 * TOED_WALKER.size:
+    if phase.states.shape[-1:] == (2 * TOED_WALKER.size,):
         n, contact = TOED_WALKER.size, contact.with_toes
     inner = phase.inner_states.shape
     degree = inner[1] if len(inner) == 3 else 1
