@@ -310,7 +310,9 @@ def test_time_grows_with_intervals_and_starts() -> None:
     assert expected(config, 128).likely == pytest.approx(twice.likely)
     assert expected(smoke_version(config), 16).likely < once.likely
     orthosis = load_config("mapd-orthosis")
-    judged, alone = (expected(orthosis.model_copy(update={"verdict": v}), 64) for v in (True, False))
+    judged, alone = (
+        expected(orthosis.model_copy(update={"verdict": v}), 64) for v in (True, False)
+    )
     assert judged.likely - FIXED > 2.0 * (alone.likely - FIXED), "springs are judged"
 
 

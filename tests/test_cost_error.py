@@ -12,6 +12,7 @@ from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.cost_error import cost_error
+from pathwalker_cli.ocp.phased import PhasedMotion
 from test_collocation import at_rest, double_integrator
 
 
@@ -41,6 +42,7 @@ def test_the_step_leads_towards_the_motion_on_the_finer_mesh() -> None:
     fine, there = solved(6)
     estimate = cost_error(program, result)
     assert estimate is not None
+    assert estimate.motion is not None
     here = program.to_motion(result.unknowns).resampled(fine.meshes, 3)
     before, after = (
         np.abs(fine.to_unknowns(motion) - there.unknowns).max()
@@ -63,6 +65,23 @@ def test_a_step_that_is_no_small_correction_is_no_estimate() -> None:
     program, result = solved(2)
     still = program.to_unknowns(at_rest(program.problem, 2, 3))
     assert cost_error(program, replace(result, unknowns=still, objective=0.0)) is None
+
+
+def test_a_step_that_leaves_a_phase_no_time_leads_to_no_motion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    program, result = solved(3)
+    real = CollocationProgram.to_motion
+
+    def turned_back(on: CollocationProgram, unknowns: np.ndarray) -> PhasedMotion:
+        motion = real(on, unknowns)
+        phases = (replace(motion.phases[0], duration=-0.1), *motion.phases[1:])
+        return motion if on is program else replace(motion, phases=phases)
+
+    monkeypatch.setattr(CollocationProgram, "to_motion", turned_back)
+    estimate = cost_error(program, result)
+    assert estimate is not None
+    assert estimate.motion is None
 
 
 def test_an_optimum_that_the_mesh_holds_exactly_has_no_error() -> None:

@@ -430,6 +430,7 @@ class GaitSolver:
             status = TOO_WEAK
         motion = self.whole_stride(program, result)
         error = judge.cost_error(program, result) if result.converged else None
+        finer = None if error is None else error.motion
         return GaitSolution(
             case=self.case,
             walker=self.walker.with_parameters(motion.parameters),
@@ -443,7 +444,7 @@ class GaitSolver:
             active=active_bounds(program, result),
             reintegration=errors,
             cost_error=None if error is None else error.total,
-            finer_motion=None if error is None else self._whole(error.motion),
+            finer_motion=finer and self._whole(finer),
             start=start,
             stages=tuple(self.stages),
             seconds=dict(self.seconds),

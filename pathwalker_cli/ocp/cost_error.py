@@ -31,12 +31,13 @@ class CostError:
     Args:
         total: The change; negative where a finer mesh costs less.
         shares: What every interval adds to it, one array for each phase, shape (N,).
-        motion: The motion on that mesh to first order; the parameters stay.
+        motion: The motion on that mesh to first order; the parameters stay.  None where the step
+            would leave a phase no time.
     """
 
     total: float
     shares: tuple[np.ndarray, ...]
-    motion: PhasedMotion
+    motion: PhasedMotion | None
 
 
 _TRUSTED: Final = 0.1
@@ -68,7 +69,8 @@ def cost_error(program: CollocationProgram, result: NlpResult) -> CostError | No
     gained = np.bincount(of, shares, minlength=sum(intervals))
     # what ties the ends together belongs to no interval
     each = np.split(gained[: sum(intervals)], np.cumsum(intervals)[:-1])
-    return CostError(total, tuple(each), fine.to_motion(step.unknowns))
+    motion = fine.to_motion(step.unknowns)
+    return CostError(total, tuple(each), motion if (motion.durations > 0.0).all() else None)
 
 
 def _halved(mesh: np.ndarray) -> np.ndarray:
