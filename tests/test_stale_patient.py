@@ -189,8 +189,6 @@ def quick(monkeypatch: pytest.MonkeyPatch, made_solution: Callable[..., GaitSolu
         monkeypatch.setattr(place, "resolver_of", near)
         monkeypatch.setattr(place, "measures", numbers)
     monkeypatch.setattr(sensitivity, "Neighbourhood", Around)
-    # what every dial of a page does takes a minute on a run that is no optimum
-    monkeypatch.setattr("pathwalker_cli.explore.offline._steps", lambda session: ())
     for place in (sensitivity, measures):
         monkeypatch.setattr(place, "all_measures", lambda o: {"cost": 0.01 * kg(o)})
     monkeypatch.setattr(learn, "resolver_of", lambda run: MadeResolver(run.case))
