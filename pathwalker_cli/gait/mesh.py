@@ -129,12 +129,15 @@ class MeshJudge:
 
     def costly(self, program: CollocationProgram, result: NlpResult) -> tuple[np.ndarray, ...]:
         """Return which intervals have to be split for the cost; none where it cannot be told."""
-        none = tuple(np.zeros(len(mesh) - 1, bool) for mesh in program.meshes)
         error = self.cost_error(program, result)
-        if error is None:
-            return none
         allowed = self._config.cost_tolerance * abs(result.objective)
-        size = sum(np.abs(part).sum() for part in error.shares)
-        if abs(error.total) <= choices.COST_SURE * allowed and size <= choices.COST_SIZE * allowed:
-            return none
-        return costly(error.shares, allowed * (choices.COST_AIM if size > allowed else 1.0))
+        if error is None or _small(error, allowed):
+            return tuple(np.zeros(len(mesh) - 1, bool) for mesh in program.meshes)
+        return costly(error.shares, choices.COST_AIM * allowed)
+
+
+def _small(error: CostError, allowed: float) -> bool:
+    """Return whether an estimated change of the cost is no reason to split an interval."""
+    size = sum(np.abs(part).sum() for part in error.shares)
+    sure = abs(error.total) <= choices.COST_SURE * allowed and size <= choices.COST_SIZE * allowed
+    return bool(sure or size <= allowed)

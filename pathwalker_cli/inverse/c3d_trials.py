@@ -111,10 +111,11 @@ def c3d_trials(
     passes: list[tuple[Recording, MarkedFile]] = []
     still: list[StandingError] = []
     pose: MarkedFile | None = None
+    stems = {path.stem for path in files}
     for path in files:
-        file, others = read_markers(path, patient, condition, config), {f.stem for f in files}
+        file = read_markers(path, patient, condition, config)
         try:
-            own = walks(file.recording, file.points, others - {path.stem})
+            own = walks(file.recording, file.points, stems - {path.stem})
             passes += [(walk, file) for walk in own if not names or path.stem in names]
         except StandingError as error:
             still.append(error)

@@ -20,7 +20,7 @@ from pathwalker_cli.io.json_file import json_text
 from pathwalker_cli.nlp.kernels import kernels_level
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.stride.balance import balance
-from pathwalker_cli.stride.measures import metrics_of, numbers_of
+from pathwalker_cli.stride.measures import metrics_of, numbers_in, numbers_of
 from pathwalker_cli.stride.series import gait_series
 from pathwalker_cli.stride.stride import stride_of
 from pathwalker_cli.versions import today, versions
@@ -140,12 +140,13 @@ def run_metrics(
     solution: GaitSolution, inputs: RunInputs, more: Mapping[str, Any] | None = None
 ) -> RunMetrics:
     """Return all metrics of a solve."""
+    measures = metrics_of(stride_of(solution.last_iterate))
     began = time.perf_counter()
-    proof = _proof(solution)  # runs the second engine
+    proof = _proof(solution, measures)  # runs the second engine
     verify = solution.seconds["verify"] + time.perf_counter() - began
     values = {
         **_outcome(solution),
-        **metrics_of(stride_of(solution.last_iterate)),
+        **measures,
         **proof,
         **_origin(solution, inputs),
         "seconds_verify": verify,
@@ -170,7 +171,7 @@ def _outcome(solution: GaitSolution) -> dict[str, Any]:
     }
 
 
-def _proof(solution: GaitSolution) -> dict[str, Any]:
+def _proof(solution: GaitSolution, measures: Mapping[str, Any]) -> dict[str, Any]:
     """Return what speaks for the result, and what held it back."""
     errors, worst, bounds = solution.reintegration, solution.violations[0], solution.bounds
     return {
@@ -180,7 +181,7 @@ def _proof(solution: GaitSolution) -> dict[str, Any]:
         "reintegration_position_error": errors.worst_position,
         "reintegration_velocity_error": errors.worst_velocity,
         "cost_error": solution.cost_error,
-        "measure_errors": _measure_errors(solution),
+        "measure_errors": _measure_errors(solution, measures),
         "second_engine_residual": solution.second_engine,
         "balance": asdict(balance(solution.last_iterate)),
         "shortfall": None if solution.shortfall is None else solution.shortfall.as_dict(),
@@ -206,14 +207,16 @@ def _proof(solution: GaitSolution) -> dict[str, Any]:
     }
 
 
-def _measure_errors(solution: GaitSolution) -> dict[str, float]:
-    """Return what halving all mesh intervals would change measures by, estimated [SI]."""
+def _measure_errors(solution: GaitSolution, measures: Mapping[str, Any]) -> dict[str, float]:
+    """Return what halving all mesh intervals would change measures by, estimated [SI].
+
+    Springs are left out: free numbers stay in the estimate.
+    """
     if solution.finer_motion is None:
         return {}
-    own = numbers_of(stride_of(solution.last_iterate))
+    own = numbers_in(measures)
     finer = numbers_of(stride_of(gait_series(solution.walker, solution.finer_motion)))
-    same = STIFFNESSES  # free numbers stay in the estimate
-    return {key: finer[key] - own[key] for key in own if key in finer and key not in same}
+    return {key: finer[key] - own[key] for key in own if key in finer and key not in STIFFNESSES}
 
 
 def _origin(solution: GaitSolution, inputs: RunInputs) -> dict[str, Any]:

@@ -409,10 +409,15 @@ def metrics_of(stride: Stride) -> dict[str, Any]:
 
 
 def numbers_of(stride: Stride) -> dict[str, float]:
-    """Return every single number of `metrics_of`, e.g. "joint_range.knee_r.min"; SI units."""
+    """Return every single number of a stride, e.g. "joint_range.knee_r.min"; SI units."""
+    return numbers_in(metrics_of(stride))
+
+
+def numbers_in(metrics: Mapping[str, Any]) -> dict[str, float]:
+    """Return every single number of what `metrics_of` returned."""
     numbers: dict[str, float] = {}
     groups: dict[str, float] = {}
-    for key, value in metrics_of(stride).items():
+    for key, value in metrics.items():
         if isinstance(value, float):
             numbers[key] = value
         elif isinstance(value, Mapping) and not key.endswith("_per_mass"):
