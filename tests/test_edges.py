@@ -47,10 +47,24 @@ def test_the_edge_of_a_parabola_is_found(step: float, limit: float) -> None:
 
 
 def test_a_flat_cost_reaches_the_limit_of_the_range() -> None:
-    edge = search(lambda k: 1.0 + 1e-5 * k, 40.0, 92.0, 1e4)
+    edge = search(lambda k: 1.0 + 1e-5 * k, 40.0, 92.0, 100.0)
     assert edge.limit
     assert edge.certain
     assert (edge.value, edge.solves) == (92.0, 1)
+
+
+def test_a_limit_far_closer_than_the_edge_needs_no_solve() -> None:
+    edge = search(lambda k: 1.0 + 0.05 * ((k - 40.0) / 400.0) ** 2, 40.0, 92.0, 400.0)
+    assert (edge.value, edge.limit, edge.certain, edge.solves) == (92.0, True, True, 0)
+    assert 0.0 < edge.rise < 0.05 / 4.0
+
+
+def test_a_soft_spring_is_tried_at_the_stiffest_at_once() -> None:
+    """From 5 to 23 N m/rad a spring stiffens more than fourfold; from there to 92 as much again."""
+    edge = search(lambda k: 1.0 + 0.03 * (1.0 - 5.0 / k), 5.0, 92.0, 18.0)
+    assert (edge.value, edge.limit, edge.solves) == (92.0, True, 1)
+    stiff = search(lambda k: 1.0 + 0.002 * (92.0 - k), 92.0, 5.0, 27.0)
+    assert (stiff.limit, stiff.solves) == (False, 2)  # the second is a look at the limit
 
 
 def test_a_slope_at_a_limit_is_followed_inwards() -> None:
