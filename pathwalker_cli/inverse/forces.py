@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 import pinocchio as pin
 
-from pathwalker_cli.conventions import GRAVITY, SIDES, SUFFIX, Side
+from pathwalker_cli.conventions import GRAVITY, SIDES, Side
 from pathwalker_cli.errors import DataError
 from pathwalker_cli.inverse.cycles import stances, swings
 from pathwalker_cli.inverse.dynamics import FORCE_CUTOFF, low_pass, smooth_rates
@@ -31,6 +31,8 @@ from pathwalker_cli.io.c3d import Recording
 from pathwalker_cli.io.c3d_events import Event
 from pathwalker_cli.io.c3d_plates import LOADED, ForcePlate, centre_of_pressure
 from pathwalker_cli.io.recordings import FORCE_COLUMNS
+from pathwalker_cli.model.contact import POINTS
+from pathwalker_cli.model.urdf import frame_positions
 from pathwalker_cli.trajectory import Trajectory
 
 _FAR: Final = 0.2
@@ -166,14 +168,8 @@ def foot_extents(model: pin.Model, q: np.ndarray) -> dict[Side, np.ndarray]:
 
 def foot_points(model: pin.Model, q: np.ndarray) -> dict[Side, np.ndarray]:
     """Return heel and toe (forward, up) [m] per side in poses (n, 10), each of shape (n, 2, 2)."""
-    data: Any = model.createData()
-    frames = [model.getFrameId(f"{p}_{SUFFIX[s]}") for s in SIDES for p in ("heel", "toe")]
-    points = np.empty((len(q), len(frames), 3))
-    for row, pose in enumerate(q):
-        pin.framesForwardKinematics(model, data, pose)
-        points[row] = [data.oMf[frame].translation for frame in frames]
-    each = np.split(points[:, :, [0, 2]], len(SIDES), axis=1)
-    return dict(zip(SIDES, each, strict=True))
+    points = frame_positions(model, q, [point.name for point in POINTS])
+    return dict(zip(SIDES, np.split(points, len(SIDES), axis=1), strict=True))
 
 
 def plate_direction(

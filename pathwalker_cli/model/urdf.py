@@ -6,7 +6,7 @@ those of the skeleton.  Heels and toes are links without mass; trunk, head and a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -69,6 +69,17 @@ def pinocchio_model(
     model = _ordered(pin.buildModelFromXML(text), skeleton)
     model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
     return model
+
+
+def frame_positions(model: pin.Model, q: np.ndarray, frames: Sequence[str]) -> np.ndarray:
+    """Return where k frames are, forward and up [m], in poses (..., n): shape (..., k, 2)."""
+    data: Any = model.createData()
+    places = [model.getFrameId(frame) for frame in frames]
+    positions = np.empty((q.size // model.nq, len(frames), 3))
+    for row, pose in enumerate(q.reshape(-1, model.nq)):
+        pin.framesForwardKinematics(model, data, pose)
+        positions[row] = [data.oMf[place].translation for place in places]
+    return positions[..., [0, 2]].reshape(*q.shape[:-1], len(frames), 2)
 
 
 def point_place(patient: Patient, condition: Condition, point: ContactPoint) -> tuple[float, float]:

@@ -32,7 +32,7 @@ from pathwalker_cli.model.elements.orthosis import OrthosisSide
 from pathwalker_cli.model.numbers import Number, Unknown
 from pathwalker_cli.model.parts import Parts
 from pathwalker_cli.model.skeleton import Side, Skeleton
-from pathwalker_cli.model.urdf import pinocchio_model
+from pathwalker_cli.model.urdf import frame_positions, pinocchio_model
 from pathwalker_cli.patient import Patient
 
 
@@ -367,26 +367,26 @@ class Walker:
         return np.concatenate(forces).T
 
     def contact_points(self, q: Any) -> np.ndarray:
-        """Return where the places of `pattern.points` touch the ground in q (10,), or would.
+        """Return where the places of `pattern.points` touch the ground in q (..., 10), or would.
 
         Returns:
-            Forward and up [m], shape (k, 2): right heel, right toe, left heel, left toe; of soles
-            right and left.
+            Forward and up [m], shape (..., k, 2): right heel, right toe, left heel, left toe; of
+            soles right and left.
         """
-        q, body = _vector(q, self.skeleton.size, "q"), self.rigid_body
-        return np.asarray(body.point_positions(q, body.parameters)).reshape(-1, 2)
+        q, body = _vectors(q, self.skeleton.size, "q"), self.rigid_body
+        places = np.asarray(body.point_positions(q.reshape(-1, q.shape[-1]).T, body.parameters))
+        return places.T.reshape(*q.shape[:-1], -1, 2)
 
     def foot_points(self, q: Any) -> np.ndarray:
-        """Return right heel, right toe, left heel, left toe of q (10,): forward, up [m], (4, 2)."""
-        frames = self.frames(q)
-        return np.array([frames[point.name] for point in POINTS])
+        """Return heel and toe, right, then left, of q (..., 10): forward, up [m], (..., 4, 2)."""
+        q = _vectors(q, self.skeleton.size, "q")
+        return frame_positions(self.model, q, [point.name for point in POINTS])
 
     def frames(self, q: Any) -> dict[str, np.ndarray]:
-        """Return where all frames are in q: forward, up [m], by name."""
-        data = self.model.createData()
-        pin.framesForwardKinematics(self.model, data, _vector(q, self.skeleton.size, "q"))
-        pairs = zip(self.model.frames, data.oMf, strict=True)
-        return {frame.name: place.translation[[0, 2]].copy() for frame, place in pairs}
+        """Return where all frames are in q (..., 10): forward, up [m], (..., 2), by name."""
+        names = [frame.name for frame in self.model.frames]
+        places = frame_positions(self.model, _vectors(q, self.skeleton.size, "q"), names)
+        return dict(zip(names, np.moveaxis(places, -2, 0), strict=True))
 
     @cached_property
     def contact_motion(self) -> ca.Function:
@@ -409,10 +409,16 @@ class Walker:
 
 def _vector(values: Any, size: int, name: str) -> np.ndarray:
     """Return a finite vector of this size, or refuse it."""
-    vector = np.asarray(values, dtype=float).ravel()
-    if vector.size == size and np.all(np.isfinite(vector)):
-        return vector
-    what = f"{vector.size} entries" if vector.size != size else "entries that are not finite"
+    return _vectors(np.ravel(values), size, name)
+
+
+def _vectors(values: Any, size: int, name: str) -> np.ndarray:
+    """Return finite vectors of this size (..., size), or refuse them."""
+    vectors = np.asarray(values, dtype=float)
+    entries = vectors.shape[-1] if vectors.ndim else 1
+    if entries == size and np.all(np.isfinite(vectors)):
+        return vectors
+    what = f"{entries} entries" if entries != size else "entries that are not finite"
     raise InputError(f"{name} has {what}", allowed=f"{size} finite numbers")
 
 

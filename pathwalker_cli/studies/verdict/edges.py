@@ -20,8 +20,8 @@ _STRETCH: Final = 2.0
 """Multiple of a step up to which the limit of the range is tried at once."""
 
 _CLOSE: Final = 0.25
-"""Share of the expected distance to the edge within which a limit needs no solve: the cost, known to
-second order, rises by a sixteenth of what is allowed, or along a slope by a quarter."""
+"""Share of the expected distance to the edge within which a limit needs no solve: to second order
+the cost rises by a sixteenth of what is allowed, or along a slope by a quarter."""
 
 Solve = Callable[[float, Optimum, bool], Optimum]
 """Solves with the number prescribed, from a neighbour; whether to insist."""
