@@ -18,7 +18,7 @@ from matplotlib import rc_context
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.solve import GaitSolver
-from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.results.run_folder import load_run
 from pathwalker_cli.stride.figures.style import NEUTRAL, STYLE, new_figure

@@ -23,7 +23,7 @@ from pathwalker_cli.case import Case
 from pathwalker_cli.config import load_config
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.gait.solution import GaitSolution, StageRecord
-from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
+from pathwalker_cli.nlp.result import Multipliers, NlpResult
 from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.problems import PROBLEMS
 from pathwalker_cli.results.run_folder import write_run

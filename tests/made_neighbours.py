@@ -16,7 +16,7 @@ from pathwalker_cli.case import Case, load_case
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.bounds import gait_bounds
-from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.results.run_folder import Run
 
 FREE = (91.9, 90.0, 6.0, 5.0)

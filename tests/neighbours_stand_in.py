@@ -15,7 +15,7 @@ from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import STIFFNESSES
 from pathwalker_cli.gait.bounds import gait_bounds
 from pathwalker_cli.model.walker import build_walker
-from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.nlp.result import NlpResult
 
 BEST = dict(zip(STIFFNESSES, (92.0, 40.0, 6.0, 5.0), strict=True))
 """K_D right at its upper limit, K_P left at its lower one, the others inside."""

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pathwalker_cli.gait import mesh
-from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
+from pathwalker_cli.nlp.ipopt import IpoptSettings, solve_program
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.cost_error import cost_error

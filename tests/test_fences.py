@@ -21,8 +21,9 @@ import qdldl
 from scipy import sparse
 
 from pathwalker_cli.nlp import machine, tape
-from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, NlpSolver, solve_program
+from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpSolver, solve_program
 from pathwalker_cli.nlp.kernels import kernels
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.nlp.stage_ldl import Elimination
 from pathwalker_cli.nlp.tape import OPERATIONS, Tape
 from pathwalker_cli.nlp.watch import ProgressReport

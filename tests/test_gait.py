@@ -109,7 +109,7 @@ def test_motion_and_unknowns_are_inverse(program: CollocationProgram) -> None:
 
 
 def test_multipliers_carry_over_unchanged_to_the_same_mesh(program: CollocationProgram) -> None:
-    from pathwalker_cli.nlp.ipopt import Multipliers
+    from pathwalker_cli.nlp.result import Multipliers
 
     rng = np.random.default_rng(6)
     before = Multipliers(np.zeros(program.size), rng.normal(size=program.rows))

@@ -14,7 +14,7 @@ from pathwalker_cli.config import load_config, smoke_version, with_values
 from pathwalker_cli.conventions import ANGLES, COORDINATES, GENERATORS
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.cost_terms import goal_values, with_goal_costs
-from pathwalker_cli.gait.costs import GOALS, Costs, Instant, Totals
+from pathwalker_cli.gait.costs import BASE, GOALS, Costs, Instant, Totals
 from pathwalker_cli.gait.solve import solve_study
 from pathwalker_cli.model.contact import PHASES, POINTS, phase_named
 from pathwalker_cli.model.walker import build_walker
@@ -242,3 +242,9 @@ def test_goals_see_rates_and_accelerations_after_a_solve_too(
     assert goal_values(motion, WALKER, {})["crouch"] >= 0.0
     assert len(seen["rate"]) == len(seen["excitation"]) == len(GENERATORS)
     assert len(seen["vdot"]) == N
+
+
+def test_running_costs_have_names_of_their_own() -> None:
+    """Integrals are looked up by name: two terms that share one would share its value too."""
+    running = [name for term in (*BASE.values(), *GOALS.values()) for name in term.integrals]
+    assert len(running) == len(set(running))

@@ -9,7 +9,7 @@ import numpy as np
 from pathwalker_cli.config import MeshConfig
 from pathwalker_cli.gait import choices
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.cost_error import CostError, cost_error
 from pathwalker_cli.stride.verify import Reintegration, reintegrate

@@ -18,7 +18,7 @@ from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
 from pathwalker_cli.model.skeleton import TOED_WALKER
-from pathwalker_cli.nlp.ipopt import Multipliers
+from pathwalker_cli.nlp.result import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
 _ARRAYS: Final = (

@@ -15,8 +15,9 @@ from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult, NlpSolver, warm_pushes
+from pathwalker_cli.nlp.ipopt import NlpSolver, warm_pushes
 from pathwalker_cli.nlp.kkt import KktSystem
+from pathwalker_cli.nlp.result import Multipliers, NlpResult
 from pathwalker_cli.nlp.watch import Observer
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.phased import PhasedMotion

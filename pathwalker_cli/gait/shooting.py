@@ -25,7 +25,8 @@ from pathwalker_cli.model.elements.muscle import (
     DEACTIVATION_TIME,
     excitation_from_rate,
 )
-from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
+from pathwalker_cli.nlp.ipopt import IpoptSettings, solve_program
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.problem import ProblemNumbers, Variables
 from pathwalker_cli.ocp.shooting import ShootingProgram

@@ -13,7 +13,7 @@ from pathwalker_cli.errors import InputError, NotConvergedError
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait.bounds import GaitBounds
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.ocp.violations import ActiveBound, Violation
 from pathwalker_cli.stride.series import GaitSeries, gait_series

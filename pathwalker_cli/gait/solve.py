@@ -46,7 +46,8 @@ from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
 from pathwalker_cli.gait.toes import with_toes
 from pathwalker_cli.gait.typical import TypicalWalk, typical_walks
 from pathwalker_cli.model.numbers import Unknown
-from pathwalker_cli.nlp.ipopt import IpoptSettings, NlpResult, solve_program
+from pathwalker_cli.nlp.ipopt import IpoptSettings, solve_program
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.nlp.watch import ProgressReport
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.multipliers import transferred

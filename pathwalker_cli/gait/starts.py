@@ -21,7 +21,7 @@ from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, Shortfall, 
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.gait.typical import typical_walks
 from pathwalker_cli.io.processes import results_of_calls
-from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.nlp.result import NlpResult
 
 Finished = Callable[[LocalOptimum], None]
 

@@ -1,4 +1,8 @@
-"""The markers of a recording: their place on the walker, and gaps in their paths."""
+"""The markers of a recording: their place on the walker, and gaps in their paths.
+
+A set is read from a file or the shipped `configs/markers.yaml`; those of other laboratories, which
+are recognised by their names, are in `inverse.marker_sets`.
+"""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from pathwalker_cli.errors import DataError, placed
 from pathwalker_cli.io.c3d import LEAST_FRAMES, Recording, read_c3d
+from pathwalker_cli.io.c3d_plates import CHANNELS
 
 LEAST_RATE: Final = 50.0
 """Frames per second below which foot strikes blur [1/s]; the plates' 20 Hz filter needs 40."""
@@ -90,7 +91,7 @@ def require_plates(recording: Recording) -> None:
         raise DataError(
             "has no force plates that can be read",
             where=recording.name,
-            allowed="plates of types 1 to 7 with their channels",
+            allowed=f"plates of types {min(CHANNELS)} to {max(CHANNELS)} with their channels",
             mend="use ik for joint angles alone, or export the analog channels too",
         )
 

@@ -25,7 +25,7 @@ METRES: Final = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 LOADED: Final = 20.0
 """Vertical force from which a plate counts as loaded [N]; about ten times its noise."""
 
-_CHANNELS: Final = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
+CHANNELS: Final = {1: 6, 2: 6, 3: 8, 4: 6, 5: 8, 6: 12, 7: 8}
 """Channels of the types that are read."""
 
 _ROWS: Final = {4: 6, 5: 6, 6: 12, 7: 8}
@@ -124,9 +124,9 @@ def _plate(
     unit: float,
 ) -> ForcePlate:
     """Return one plate from its parameters, all channels (samples, channels) and their units."""
-    if kind not in _CHANNELS:
-        raise DataError(f"is of type {kind}", allowed=f"types {', '.join(map(str, _CHANNELS))}")
-    count = _CHANNELS[kind]
+    if kind not in CHANNELS:
+        raise DataError(f"is of type {kind}", allowed=f"types {', '.join(map(str, CHANNELS))}")
+    count = CHANNELS[kind]
     columns = values["CHANNEL"][:count].astype(int) - 1
     if columns.size < count or columns.min() < 0 or columns.max() >= analog.shape[1]:
         raise DataError(f"names channels that are not there, and type {kind} has {count}")

@@ -1,4 +1,7 @@
-"""What a patient walks with: the force elements, masses and soles that a condition adds."""
+"""What a patient walks with: the force elements, masses and soles that a condition adds.
+
+One hinge per side, at the ankle: `Walker.device_torques` and what is made from it know no other.
+"""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ import numpy as np
 from pathwalker_cli.nlp.ma57 import ipopt_elimination, ma57_options
 from pathwalker_cli.nlp.machine import keep_freed_memory, use_one_blas_thread
 from pathwalker_cli.nlp.program import Program
+from pathwalker_cli.nlp.result import Multipliers, NlpResult
 from pathwalker_cli.nlp.stage_ldl import stage_factors
 from pathwalker_cli.nlp.watch import Observer, Watcher, interruptible
 
@@ -80,46 +81,6 @@ def warm_pushes(distance: float) -> dict[str, Any]:
     """Return options that move a warm start this far off its bounds [solver units]."""
     kinds = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
     return {f"warm_start_{kind}": distance for kind in kinds}
-
-
-@dataclass(frozen=True)
-class Multipliers:
-    """Multipliers of the bounds on the unknowns and of the rows."""
-
-    unknowns: np.ndarray
-    rows: np.ndarray
-
-    @property
-    def stacked(self) -> np.ndarray:
-        """Those of all unknowns and then of all rows, shape (n + m,)."""
-        return np.concatenate([self.unknowns, self.rows])
-
-
-@dataclass(frozen=True)
-class NlpResult:
-    """What IPOPT returned.
-
-    Args:
-        status: "converged" or the reason why not, in words.
-        unknowns: Scaled unknowns.
-        rows: Scaled values of the rows.
-        seconds: Wall seconds of the solve.
-        seconds_functions: Wall seconds in function evaluations.
-    """
-
-    status: str
-    unknowns: np.ndarray
-    rows: np.ndarray
-    objective: float
-    multipliers: Multipliers
-    iterations: int
-    seconds: float
-    seconds_functions: float
-
-    @property
-    def converged(self) -> bool:
-        """Whether the tolerances were met."""
-        return self.status == "converged"
 
 
 _REASONS: Final = {

@@ -25,8 +25,8 @@ from typing import Any, Final
 import numpy as np
 from scipy import sparse
 
-from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.nlp.program import Program, limits
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.nlp.stage_ldl import SymmetricSystem, in_order_of
 
 _REGULARISATION: Final = 1e-10

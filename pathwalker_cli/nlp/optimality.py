@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.nlp.ipopt import Multipliers
 from pathwalker_cli.nlp.program import Program, limits
+from pathwalker_cli.nlp.result import Multipliers
 
 _MEAN_MULTIPLIER: Final = 100.0
 """Mean multiplier up to which IPOPT measures stationarity as it is (its s_max)."""

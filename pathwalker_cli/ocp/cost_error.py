@@ -17,8 +17,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.nlp.kkt import KktSystem
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.multipliers import transferred
 from pathwalker_cli.ocp.phased import PhasedMotion

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pathwalker_cli.nlp.ipopt import Multipliers
+from pathwalker_cli.nlp.result import Multipliers
 from pathwalker_cli.ocp.collocation import CollocationProgram
 from pathwalker_cli.ocp.phased import collocation_points, quadrature_weights
 

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from pathwalker_cli.nlp.ipopt import NlpResult
 from pathwalker_cli.nlp.program import Program, limits
+from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.ocp.transcription import Transcription
 
 _NEAR: Final = 1e-2

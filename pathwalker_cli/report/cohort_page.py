@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import Final
 
-from pathwalker_cli.conventions import SIDES, to_degrees
+from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.io.csv_file import number, read_rows
 from pathwalker_cli.report.content import Fact, Page, Row, Section, Table
+from pathwalker_cli.stride.measure import Measure
+from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.studies.batch.ledger import CASES, CONVERGED, PENDING, TABLE, read_metrics
 
 Rows = Sequence[Mapping[str, str]]
 
 _COLUMNS: Final = ("case", "patient", "problem", "status")
-_HEAD: Final = (
-    "patient", "problem", "case", "status", "speed [m/s]", "step r, l [m]",
-    "least knee flexion r, l [deg]", "K_D r, l [N m/rad]", "K_P r, l [N m/rad]", "effort [s/m]",
-    "re-integration [rad, m]",
-)  # fmt: skip
-_DEGREES: Final = float(to_degrees(1.0))
+_WHO: Final = ("patient", "problem", "case", "status")
+_PROOF: Final = "re-integration [rad, m]"
 
 
 def cohort_page(folders: Sequence[Path]) -> Page:
@@ -66,29 +66,43 @@ def _section(folder: Path, rows: Rows) -> Section:
         "r, l: right, left; springs are those of least effort, K_D against dorsiflexion, K_P "
         "against plantarflexion",
     )
-    table = Table(_HEAD, tuple(map(_row, rows)), notes=notes, columns="wwwpnnnnnnn")
+    families = _families()
+    head = (*_WHO, *map(_heading, families), _PROOF)
+    table = Table(
+        head,
+        tuple(_row(row, families) for row in rows),
+        notes=notes,
+        columns="wwwp" + "n" * (len(families) + 1),
+    )
     return Section(folder.resolve().name, tables=(table,))
 
 
-def _row(row: Mapping[str, str]) -> Row:
+def _families() -> list[tuple[Measure, ...]]:
+    """Return the measures of a batch but the cost, those of both sides together."""
+    shown = [measure for measure in measures_in("batch") if measure.key != "cost"]
+    return [tuple(group) for _, group in groupby(shown, attrgetter("family"))]
+
+
+def _heading(family: tuple[Measure, ...]) -> str:
+    first, sides = family[0], len(family) > 1
+    label = first.label.removesuffix(SIDES[0]).rstrip(", ") + " r, l" if sides else first.label
+    return f"{label} [{first.shown_unit}]" if first.shown_unit else label
+
+
+def _row(row: Mapping[str, str], families: Sequence[tuple[Measure, ...]]) -> Row:
     """Return a case; one that failed has its reason instead of numbers."""
     lead = f"{row['patient']}--{row['problem']}"
     case = row["case"].removeprefix(lead).strip("-")
     converged = row["status"] == CONVERGED
     cells = (
         row["patient"], row["problem"], case or "-", row["status"],
-        number(row, "walking_speed", ".3f"),
-        _pair(row, "step_length", ".3f"),
-        _pair(row, "min_stance_knee_flexion", ".1f", _DEGREES),
-        _pair(row, "dorsiflexion_stiffness", ".1f"),
-        _pair(row, "plantarflexion_stiffness", ".1f"),
-        number(row, "effort_per_distance", ".3f"),
+        *(_shown(row, family) for family in families),
         number(row, "reintegration_position_error", ".1e") if converged else "-",
     )  # fmt: skip
     return Row(cells, "" if converged else "failed")
 
 
-def _pair(row: Mapping[str, str], stem: str, form: str, factor: float = 1.0) -> str:
-    """Return the values of both sides, "-" where there are none."""
-    values = [number(row, f"{stem}_{side}", form, factor) for side in SIDES]
+def _shown(row: Mapping[str, str], family: Sequence[Measure]) -> str:
+    """Return a measure, or the values of both sides, "-" where there are none."""
+    values = [number(row, m.key, f".{m.digits}f", m.in_shown_unit(1.0)) for m in family]
     return "-" if set(values) == {"-"} else ", ".join(values)

@@ -32,7 +32,7 @@ from pathwalker_cli.io.json_file import read_json, write_json
 from pathwalker_cli.io.lock import locked
 from pathwalker_cli.io.recordings import write_recording
 from pathwalker_cli.io.yaml_file import validate
-from pathwalker_cli.nlp.ipopt import Multipliers
+from pathwalker_cli.nlp.result import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.patient import load_patient, recordings_beside
 from pathwalker_cli.results.metrics import (

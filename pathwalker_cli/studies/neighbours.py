@@ -17,7 +17,7 @@ from pathwalker_cli.gait.motion_file import read_arrays
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.io.atomic import atomic_open
 from pathwalker_cli.io.processes import results_of_calls
-from pathwalker_cli.nlp.ipopt import Multipliers, NlpResult
+from pathwalker_cli.nlp.result import Multipliers, NlpResult
 from pathwalker_cli.results.metrics import sha256
 from pathwalker_cli.results.run_folder import Run
 from pathwalker_cli.studies.base import require_optimum, resolver_of

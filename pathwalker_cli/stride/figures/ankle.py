@@ -74,7 +74,7 @@ def ankle_torque(series: GaitSeries, reference: Reference | None = None) -> Figu
     """Return the net ankle torque over the ankle angle of each side, with its slope under load.
 
     Dorsiflexion is positive, and so is the plantarflexing torque of muscles and orthosis.  The
-    slope is that of `ankle_profile.ankle_torque_slope`, over the thick part of the path.
+    slope is that of `stride.measures.ankle_torque_line`, over the thick part of the path.
     """
     fig = style.new_figure(2.4)
     panels = fig.subplots(1, 2, sharex=True, sharey=True)
