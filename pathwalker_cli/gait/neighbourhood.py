@@ -128,19 +128,18 @@ class Neighbourhood:
         return Derivative(answer.cost * factor, below, above, step)
 
 
-def extrapolated(
-    optimum: Optimum, below: Optimum, above: Optimum, step: float, there: Optimum
-) -> Optimum:
+def extrapolated(optimum: Optimum, near: Optimum, step: float, there: Optimum) -> Optimum:
     """Return an optimum to first order where some of its numbers have changed; none is solved.
 
     Args:
         optimum: The optimum.
-        below: The same unknowns in the program of a step back.
-        above: The same unknowns in the program of a step on the way.
+        near: The same unknowns in the program of a step on the way.
         step: That step as a share of the way.
         there: The same unknowns in the program at the end of the way.
     """
-    return _moved_by(optimum, optimum.kkt.answer(below.program, above.program, step), 1.0, there)
+    # a difference to one side: half a step either way of the middle
+    answer = optimum.kkt.answer(optimum.program, near.program, step / 2.0)
+    return _moved_by(optimum, answer, 1.0, there)
 
 
 def _moved_by(optimum: Optimum, answer: Answer, amount: float, there: Optimum) -> Optimum:

@@ -367,26 +367,37 @@ class Walker:
         return np.concatenate(forces).T
 
     def contact_points(self, q: Any) -> np.ndarray:
-        """Return where the places of `pattern.points` touch the ground in q (10,), or would.
+        """Return where the places of `pattern.points` touch the ground in poses, or would.
+
+        Args:
+            q: Generalised coordinates, shape (10,) or (n, 10).
 
         Returns:
-            Forward and up [m], shape (k, 2): right heel, right toe, left heel, left toe; of soles
-            right and left.
+            Forward and up [m], shape (k, 2) or (n, k, 2): right heel, right toe, left heel, left
+            toe; of soles right and left.
         """
-        q, body = _vector(q, self.skeleton.size, "q"), self.rigid_body
-        return np.asarray(body.point_positions(q, body.parameters)).reshape(-1, 2)
+        q, body = _poses(q, self.skeleton.size), self.rigid_body
+        places = np.asarray(body.point_positions(q.T, body.parameters))
+        return places.T.reshape(*q.shape[:-1], -1, 2)
 
     def foot_points(self, q: Any) -> np.ndarray:
-        """Return right heel, right toe, left heel, left toe of q (10,): forward, up [m], (4, 2)."""
-        frames = self.frames(q)
-        return np.array([frames[point.name] for point in POINTS])
+        """Return right heel, right toe, left heel, left toe: forward, up [m], (..., 4, 2).
 
-    def frames(self, q: Any) -> dict[str, np.ndarray]:
-        """Return where all frames are in q: forward, up [m], by name."""
-        data = self.model.createData()
-        pin.framesForwardKinematics(self.model, data, _vector(q, self.skeleton.size, "q"))
-        pairs = zip(self.model.frames, data.oMf, strict=True)
-        return {frame.name: place.translation[[0, 2]].copy() for frame, place in pairs}
+        The poses q are of shape (..., 10).
+        """
+        frames = self.frames(q, [point.name for point in POINTS])
+        return np.stack(list(frames.values()), axis=-2)
+
+    def frames(self, q: Any, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return where frames are in poses q (..., 10): forward, up [m], (..., 2), by name."""
+        q, model = _poses(q, self.skeleton.size), self.model
+        numbers, data = [model.getFrameId(name) for name in names], model.createData()
+        places = np.empty((q.size // q.shape[-1], len(numbers), 3))
+        for row, pose in zip(places, np.atleast_2d(q), strict=True):
+            pin.forwardKinematics(model, data, pose)
+            row[:] = [pin.updateFramePlacement(model, data, k).translation for k in numbers]
+        planar = places[..., [0, 2]].reshape(*q.shape[:-1], len(numbers), 2)
+        return dict(zip(names, np.moveaxis(planar, -2, 0), strict=True))
 
     @cached_property
     def contact_motion(self) -> ca.Function:
@@ -414,6 +425,14 @@ def _vector(values: Any, size: int, name: str) -> np.ndarray:
         return vector
     what = f"{vector.size} entries" if vector.size != size else "entries that are not finite"
     raise InputError(f"{name} has {what}", allowed=f"{size} finite numbers")
+
+
+def _poses(q: Any, size: int) -> np.ndarray:
+    """Return one pose (size,) or several (n, size), or refuse them."""
+    poses = np.asarray(q, dtype=float)
+    if poses.ndim == 2 and poses.shape[1] == size and np.all(np.isfinite(poses)):
+        return poses
+    return _vector(poses, size, "q")
 
 
 def build_walker(

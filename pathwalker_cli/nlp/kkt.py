@@ -26,6 +26,7 @@ import numpy as np
 from scipy import sparse
 
 from pathwalker_cli.nlp.ipopt import NlpResult
+from pathwalker_cli.nlp.matrices import matrix_of
 from pathwalker_cli.nlp.program import Program, limits
 from pathwalker_cli.nlp.stage_ldl import SymmetricSystem, in_order_of
 
@@ -225,10 +226,15 @@ class KktSystem:
     def _first_order_of(self, program: Program) -> tuple[float, np.ndarray, np.ndarray]:
         x, p = self.result.unknowns, program.parameters
         objective, gradient = self._functions["grad_f"](x, p)
-        rows, jacobian = self._functions["jac_g"](x, p)
-        lagrangian = np.asarray(gradient).ravel()
-        lagrangian = lagrangian + jacobian.sparse().T @ self.result.multipliers.rows
-        return float(objective), lagrangian, np.asarray(rows).ravel()
+        rows, jacobian = self._rows_at(x, p)
+        lagrangian = np.asarray(gradient).ravel() + jacobian.T @ self.result.multipliers.rows
+        return float(objective), lagrangian, rows
+
+    def _rows_at(self, x: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, sparse.csc_array]:
+        """Return the rows (m,) and their Jacobian (m, n)."""
+        function = self._functions["jac_g"]
+        rows, jacobian = function(x, p)
+        return np.asarray(rows).ravel(), matrix_of(function, jacobian)
 
     def _change(self, below: Program, above: Program, step: float) -> _Change:
         low, high = self._first_order(below), self._first_order(above)
@@ -264,9 +270,10 @@ class KktSystem:
     def _second_order(self) -> tuple[Any, Any]:
         """Hessian of the Lagrangian (n, n) and Jacobian of the rows (m, n)."""
         x, p = self.result.unknowns, self.program.parameters
-        triangle = self._functions["hess_lag"](x, p, 1.0, self.result.multipliers.rows).sparse()
-        _, jacobian = self._functions["jac_g"](x, p)
-        return (triangle + sparse.triu(triangle, 1).T).tocsr(), jacobian.sparse().tocsr()
+        function = self._functions["hess_lag"]
+        triangle = matrix_of(function, function(x, p, 1.0, self.result.multipliers.rows))
+        _, jacobian = self._rows_at(x, p)
+        return (triangle + sparse.triu(triangle, 1).T).tocsr(), jacobian.tocsr()
 
     @cached_property
     def factors(self) -> SymmetricSystem:

@@ -175,7 +175,7 @@ def _rearmost_pressure(stride: Stride, side: Side) -> float:
     rows = walker.pattern.rows(side)
     load = stride.known("point_force")[at, 1::2][:, rows]
     centre = (load * stride.contact_position[at][:, rows, 0]).sum(axis=1) / load.sum(axis=1)
-    ends = np.array([walker.foot_points(q)[first : first + 2, 0] for q in stride.q[at]])
+    ends = walker.foot_points(stride.q[at])[:, first : first + 2, 0]
     return float(((centre - ends[:, 0]) / np.diff(ends)[:, 0]).min())
 
 

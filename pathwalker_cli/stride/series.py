@@ -32,7 +32,7 @@ class Sampled:
     @cached_property
     def contact_position(self) -> np.ndarray:
         """Where the places of the pattern touch the ground, or would: x and z [m], (n, k, 2)."""
-        return np.array([self.walker.contact_points(q) for q in self.q])
+        return self.walker.contact_points(self.q)
 
     def column(self, coordinate: str) -> np.ndarray:
         """Return one generalised coordinate over time, shape (n,)."""
