@@ -18,9 +18,6 @@ from pathwalker_cli.studies.run import Outcome, run_study
 STOPPED: Final = "stopped by the user"
 """Status of a solve that its observer ended."""
 
-_STEP: Final = 1e-2
-"""Share of a move by which its derivatives are taken."""
-
 
 class Session:
     """The optimum of a run that is looked at, and those around it.
@@ -56,12 +53,8 @@ class Session:
         before, after = (settings_of(self.dials) | dict(s) for s in (self.settings, settings))
         if [v is None for v in before.values()] != [v is None for v in after.values()]:
             return None
-        near = {
-            key: None if value is None else value + _STEP * ((after[key] or 0.0) - value)
-            for key, value in before.items()
-        }
         try:
-            return extrapolated(self.optimum, self._at(near), _STEP, self._at(settings))
+            return extrapolated(self.optimum, self._at(settings))
         except InputError:  # the end of what is allowed
             return None
 

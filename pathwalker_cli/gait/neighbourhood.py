@@ -128,17 +128,14 @@ class Neighbourhood:
         return Derivative(answer.cost * factor, below, above, step)
 
 
-def extrapolated(optimum: Optimum, near: Optimum, step: float, there: Optimum) -> Optimum:
-    """Return an optimum to first order where some of its numbers have changed; none is solved.
+def extrapolated(optimum: Optimum, there: Optimum) -> Optimum:
+    """Return an optimum to first order where numbers of its problem have changed; none is solved.
 
     Args:
         optimum: The optimum.
-        near: The same unknowns in the program of a step on the way.
-        step: That step as a share of the way.
-        there: The same unknowns in the program at the end of the way.
+        there: The same unknowns in the program of the other numbers.
     """
-    # a difference to one side: half a step either way of the middle
-    answer = optimum.kkt.answer(optimum.program, near.program, step / 2.0)
+    answer = optimum.kkt.towards(there.program, choices.WAY_SHARE)
     return _moved_by(optimum, answer, 1.0, there)
 
 
