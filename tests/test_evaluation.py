@@ -40,6 +40,7 @@ from pathwalker_cli.evaluation.recorded import (
     reference_stride,
     spread,
 )
+from pathwalker_cli.evaluation.tables import change_lines
 from pathwalker_cli.model.walker import build_walker
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.stride.measures import ankle_line, measures_in, metrics_of
@@ -387,6 +388,15 @@ def test_changes_are_differences_of_values_and_of_recorded_means() -> None:
     assert str(knee.paper) == "-9.26"
     assert str(changes["peak_ankle_extension_torque_left"].paper) == "falls"
     assert changes["stride_time"].paper is None
+
+
+def test_a_column_of_which_nothing_is_known_is_left_out() -> None:
+    changes = gait_changes(made_evaluation("barefoot"), made_evaluation("orthosis"))
+    full = [line.split() for line in change_lines(changes)][1]
+    assert full == ["barefoot", "orthosis", "change", "[%]", "recorded", "paper", "unit"]
+    bare = [replace(change, recorded=None, paper=None) for change in changes]
+    head = [line.split() for line in change_lines(bare)][1]
+    assert head == ["barefoot", "orthosis", "change", "[%]", "unit"]
 
 
 def test_without_recordings_the_rest_is_still_there() -> None:

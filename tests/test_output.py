@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.markers import TICKDOWN
 from rich.console import Console
 
 from conftest import MadeSolution
@@ -26,6 +27,7 @@ from pathwalker_cli.ocp.phased import PhasedMotion
 from pathwalker_cli.results.tables import TABLES, controls_table, forces_table, torques_table
 from pathwalker_cli.results.text import (
     _discretisation_text,
+    solution_notes,
     spring_notes,
     summary,
     summary_renderable,
@@ -39,6 +41,7 @@ from pathwalker_cli.stride.figures import (
     make_figure,
     save_figures,
 )
+from pathwalker_cli.stride.figures.cycles import support_changes
 from pathwalker_cli.stride.measures import ankle_torque_line, metrics_of
 from pathwalker_cli.stride.series import GaitSeries
 from pathwalker_cli.stride.stride import centre_of_pressure, own_cycle, stride_of
@@ -314,6 +317,18 @@ def test_angles_are_clinical(series: GaitSeries) -> None:
     assert any(curve.shape == expected.shape and np.allclose(curve, expected) for curve in curves)
 
 
+def test_teeth_of_moments_are_marked_where_a_foot_changes_its_support(series: GaitSeries) -> None:
+    stride, moments = stride_of(series), make_figure("joint_moments", series)
+    apart = 100.0 * np.diff(stride.time).max() / stride.duration
+    for side in SIDES:
+        places = support_changes(stride, side)
+        assert len(places) == 4, "heel and toe come down, heel and toe leave the ground"
+        leaves = 100.0 * (stride.toe_off(side) - stride.strike(side)) / stride.duration
+        assert np.abs(places - leaves).min() <= apart
+        ticks = [line for line in moments.axes[0].lines if line.get_marker() == TICKDOWN]
+        assert any(np.array_equal(line.get_xdata(), places) for line in ticks)
+
+
 def test_figures_are_the_same_bytes_every_time(series: GaitSeries, tmp_path: Path) -> None:
     barefoot = stylised_series("barefoot")
     assert set(figure_names(series)) - set(figure_names(barefoot)) == {"orthosis_curves"}
@@ -376,3 +391,14 @@ def test_what_a_finer_mesh_changes_is_told_as_far_as_digits_show_it(
         "halving all mesh intervals would change the cost by about -0.2 %, "
         "least stance knee flexion, left by +0.11 deg"
     )
+
+
+def test_equations_of_motion_that_are_met_only_roughly_are_a_note(
+    made_solution: MadeSolution,
+) -> None:
+    solution, told = made_solution(), {}
+    for residual in (1e-9, 0.36):
+        solution.__dict__["second_engine"] = residual
+        told[residual] = [note for note in solution_notes(solution) if "violated" in note]
+    assert told[1e-9] == []
+    assert "violated by up to 0.36 N or N m" in told[0.36][0]

@@ -21,7 +21,7 @@ from conftest import MadeSolution, sketch
 from pathwalker_cli.cli import cli
 from pathwalker_cli.config import load_config
 from pathwalker_cli.config.values import changed_values, differing_values
-from pathwalker_cli.conventions import STIFFNESSES
+from pathwalker_cli.conventions import SIDES, STIFFNESSES
 from pathwalker_cli.evaluation.recorded import Spread
 from pathwalker_cli.inverse.study import load_inverse_dynamics
 from pathwalker_cli.patient import load_patient
@@ -33,6 +33,7 @@ from pathwalker_cli.report.page import page_html, page_of
 from pathwalker_cli.report.pdf import page_pdf
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.springs import recommended, spring_section, verdict_words
+from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.figures.inline import inline_svg
 from pathwalker_cli.stride.figures.style import new_figure
 from pathwalker_cli.stride.measures import measures_in
@@ -44,7 +45,7 @@ from pathwalker_cli.studies.tradeoff.result import write_tables as write_tradeof
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input
 from pathwalker_cli.studies.uncertainty.result import Uncertainty
 from pathwalker_cli.studies.uncertainty.result import write_tables as write_uncertainty
-from pathwalker_cli.studies.verdict import verdict_of_metrics
+from pathwalker_cli.studies.verdict import StifferStops, StopVerdict, verdict_of_metrics
 from report_runs import HOSTILE, made_verdict, write_made_run
 
 pytestmark = pytest.mark.usefixtures("sketched")
@@ -200,6 +201,24 @@ def test_a_pair_of_runs_is_two_pages_of_pdf(runs: Path, tmp_path: Path) -> None:
     assert content.count(b"/Type /Page\n") == 2
     assert out.stat().st_size < 1_000_000
     assert page.is_file()
+
+
+@pytest.mark.drawn
+def test_stops_that_carry_much_leave_it_two_pages(
+    made_solution: MadeSolution, runs: Path, tmp_path: Path
+) -> None:
+    moved = {"cost": -0.11, **dict.fromkeys(("step_length_left", "step_length_right"), 0.017)}
+    moved |= dict.fromkeys(("min_stance_knee_flexion_left", STIFFNESSES[0]), -4.04)
+    stops = tuple(
+        StopVerdict(side, kind, 0.13, 0.05, 0.4, 30.0, 0.6, 200.0, moved)
+        for side in SIDES
+        for kind in ("dorsiflexion", "plantarflexion")
+    )
+    verdict = made_verdict(stops=stops, stiffer_stops=StifferStops(2.0, "converged", moved))
+    write_run(tmp_path / "worn", made_solution(), more={"verdict": verdict.as_dict()})
+    result = report(tmp_path / "worn", runs / "mapd-barefoot", "--pdf", tmp_path / "report.pdf")
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "report.pdf").read_bytes().count(b"/Type /Page\n") == 2
 
 
 def test_a_pdf_holds_whatever_stands_in_files() -> None:
@@ -381,7 +400,7 @@ def test_assumptions_name_sources_proof_and_changed_values(
     page = page_of([folder])
     rows = {row.cells[0]: row.cells[1] for row in section(page, "What was").tables[0].rows}
     assert rows["Config"] == "bounds.friction = 0.6"
-    assert "left knee at its lower bound 0.264 rad (15.1 deg) in left toe" in rows["Active bounds"]
+    assert "left knee at its lower bound 15.1 deg in left toe" in rows["Active bounds"]
     assert "walking speed at its lower bound 0.636 m/s" in rows["Active bounds"]
     assert "1 more of muscles" in rows["Active bounds"]
     assert "reached: largest violation 2.0e-09 (right knee rate" in rows["Tolerances"]

@@ -10,9 +10,10 @@ import pytest
 from click.testing import CliRunner
 
 from pathwalker_cli.cli import cli
+from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.patient.variation import Variation, varied
-from pathwalker_cli.studies.sensitivity import default_places
+from pathwalker_cli.studies.sensitivity import SensitivityStudy, asked_checks, default_places
 from pathwalker_cli.studies.sensitivity.figures import save_sensitivity_figure
 from pathwalker_cli.studies.sensitivity.result import (
     Check,
@@ -62,6 +63,16 @@ def test_barefoot_no_orthosis_is_asked_about() -> None:
     places = default_places(PATIENT, with_orthosis=False)
     assert not any(place.startswith("orthosis") for place in places)
     assert {"strengths.knee_extension.left", "body_mass", "segment_lengths.shank"} <= set(places)
+
+
+@pytest.mark.parametrize("worn", [("right", "left"), ("left",)])
+def test_a_check_without_a_side_is_one_of_every_side_that_is_worn(worn: tuple[str, ...]) -> None:
+    study = SensitivityStudy(base="", check=("strengths", "plantarflexion_stiffness"))
+    springs = [f"plantarflexion_stiffness_{side}" for side in worn]
+    places = (*springs, "strengths", "strengths.hip_flexion.left")
+    assert asked_checks(study, places) == ("strengths", *springs)
+    with pytest.raises(ConfigError, match="names plantarflexion_stiffness"):
+        asked_checks(study, places[len(worn) :])
 
 
 def test_the_terminal_tells_elasticities(made_lines: list[str]) -> None:

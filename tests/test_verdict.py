@@ -30,7 +30,7 @@ from pathwalker_cli.studies.verdict import (
     verdict_of_metrics,
 )
 from pathwalker_cli.studies.verdict.judge import _nearest, _quadratic_edge, _stops, verdict_of
-from pathwalker_cli.studies.verdict.words import stop_warnings, verdict_lines
+from pathwalker_cli.studies.verdict.words import stop_sentence, stop_warnings, verdict_lines
 
 INSIDE = NumberVerdict(
     "plantarflexion_stiffness_right", "K_P right", "N m/rad", 20.0,
@@ -153,8 +153,11 @@ def test_stops_that_carry_much_are_a_warning() -> None:
         ),
         (StifferStops(2.0, "iteration limit", {}), "these stops: iteration limit"),
     ):
-        *_, last = stop_warnings(verdict(springs=(PRESCRIBED,), stops=(stop,), stiffer_stops=twice))
+        found = verdict(springs=(PRESCRIBED,), stops=(stop,), stiffer_stops=twice)
+        *_, last = stop_warnings(found)
         assert end in last
+        assert stop_sentence(found).endswith(f"measure it (orthosis.stop_stiffness); {last}")
+    assert stop_sentence(verdict()) == ""
 
 
 def test_verdicts_of_older_runs_know_nothing_of_stops() -> None:

@@ -10,11 +10,11 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.animation.recorded import RecordedFrames, body_paths, recorded_frames
+from pathwalker_cli.animation.recorded import RecordedFrames, recorded_frames
 from pathwalker_cli.conventions import SIDES, Side
 from pathwalker_cli.evaluation.run import run_names, run_notes, stride_of_run
 from pathwalker_cli.stride.series import GaitSeries
-from pathwalker_cli.stride.stride import centre_of_pressure, stride_of, switching_times
+from pathwalker_cli.stride.stride import body_points, centre_of_pressure, stride_of, switching_times
 
 _CLOSED: Final = 1e-3
 """Difference between beginning and end of a stride [m, rad] below which it repeats itself."""
@@ -122,7 +122,7 @@ def gait_frames(
     later = strike + series.duration * np.arange(count) / count
     again = later >= series.duration
     time = np.where(again, later - series.duration, later)
-    points = body_paths(series.walker, _at(series.time, series.q, time))
+    points = body_points(series.walker, _at(series.time, series.q, time))
     phase = _phases(series, time)
     ahead = np.where(again, series.distance, 0.0) - points["heel_r"][0, 0]
     feet = dict(

@@ -52,7 +52,7 @@ def recorded_frames(walker: Walker, trial: str, count: int) -> RecordedFrames:
     one, cycle, markers = cycles[0]
     share = np.arange(count) / count
     rows = cycle.start + (cycle.end - cycle.start) * share
-    points = body_paths(walker.flat_footed, _at(one.motion.values, rows))
+    points = body_points(walker.flat_footed, _at(one.motion.values, rows))
     forward = one.motion.values[:, COORDINATES.index("pelvis_tx")]
     walked = share * (forward[cycle.end] - forward[cycle.start])
     eye = walked + float((points["hip_r"][:, 0] - walked).mean())
@@ -95,12 +95,6 @@ def _at(columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Return columns between their rows, shape (n, m) to (len(rows), m)."""
     known = np.arange(len(columns))
     return np.stack([np.interp(rows, known, column) for column in columns.T], axis=1)
-
-
-def body_paths(walker: Walker, poses: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the points of the body in poses (n, 10) [m], shape (n, 2) each."""
-    bodies = [body_points(walker, q) for q in poses]
-    return {name: np.array([body[name] for body in bodies]) for name in bodies[0]}
 
 
 def _before(eye: np.ndarray, path: np.ndarray) -> np.ndarray:

@@ -22,7 +22,6 @@ from pathwalker_cli.stride.figures.style import LINE_COLOUR
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import measures_in
 from pathwalker_cli.stride.stride import stride_of
-from pathwalker_cli.studies.measures import all_measures
 
 _ROOM: Final = 1.12
 """By how much more is seen than the walk of the run needs: others take longer steps."""
@@ -124,7 +123,7 @@ def drawing_of(optimum: Optimum, name: str) -> Drawing:
 
 def picture(optimum: Optimum, dials: Sequence[Dial], name: str = "") -> dict[str, Any]:
     """Return what is seen of an optimum, solved or extrapolated, and where the dials stand."""
-    stride, values = stride_of(optimum.series), all_measures(optimum)
+    stride = stride_of(optimum.series)
     held = {dial.unknown: dial.key for dial in dials if dial.unknown}
     return {
         "walker": stride_data(drawing_of(optimum, name)),
@@ -140,7 +139,7 @@ def picture(optimum: Optimum, dials: Sequence[Dial], name: str = "") -> dict[str
         "values": {
             measure.key: measure.in_shown_unit(value)
             for measure in numbers_shown()
-            if (value := values.get(measure.key)) is not None
+            if (value := optimum.cost if measure.value is None else measure.of(stride)) is not None
         },
         "found": {key: optimum.value(unknown) for unknown, key in held.items()},
     }

@@ -18,9 +18,6 @@ from pathwalker_cli.studies.run import Outcome, run_study
 STOPPED: Final = "stopped by the user"
 """Status of a solve that its observer ended."""
 
-_STEP: Final = 1e-4
-"""Share of a move by which its derivatives are taken."""
-
 
 class Session:
     """The optimum of a run that is looked at, and those around it.
@@ -56,27 +53,22 @@ class Session:
         before, after = (settings_of(self.dials) | dict(s) for s in (self.settings, settings))
         if [v is None for v in before.values()] != [v is None for v in after.values()]:
             return None
-
-        def moved(share: float) -> Settings:
-            return {
-                key: None if value is None else value + share * ((after[key] or 0.0) - value)
-                for key, value in before.items()
-            }
-
         try:
-            ends = [
-                self.resolver.restored(
-                    case_at(self.run.case, self.dials, moved(share)), self.optimum.result
-                )
-                for share in (-_STEP, _STEP, 1.0)
-            ]
+            return extrapolated(self.optimum, self._at(settings))
         except InputError:  # the end of what is allowed
             return None
-        below, above, there = ends
-        return extrapolated(self.optimum, below, above, _STEP, there)
+
+    def _at(self, settings: Settings) -> Optimum:
+        """Return what is looked at in the problem of other settings."""
+        case = case_at(self.run.case, self.dials, settings)
+        return self.resolver.restored(case, self.optimum.result)
 
     def solve(self, settings: Settings, start: Optimum | None = None) -> Optimum:
         """Solve the problem with other settings, from `start`, and go there; if that fails, stay.
+
+        Args:
+            settings: The settings.
+            start: Where to begin, in the problem of the settings; what is looked at if left out.
 
         Raises:
             InputError: If config or patient refuse the numbers.
@@ -84,12 +76,10 @@ class Session:
         if dict(settings) == settings_of(self.dials):
             self.go_home()
             return self.optimum
-        case, end = case_at(self.run.case, self.dials, settings), self.optimum
-        starts = [start or self.optimum, self._home]
-        for begin in starts if self.optimum is not self._home else starts[:1]:
-            end = self.resolver.resolve(case, begin, insist=False)
-            if end.converged or end.result.status == STOPPED:
-                break
+        start = start or self._at(settings)
+        end = self.resolver.solved(start, insist=False)
+        if not (end.converged or end.result.status == STOPPED or self.optimum is self._home):
+            end = self.resolver.solved(replace(start, result=self._home.result), insist=False)
         if end.converged:
             self.optimum, self.settings = end, dict(settings)
             self.away = True

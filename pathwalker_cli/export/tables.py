@@ -102,9 +102,9 @@ def control_table(series: GaitSeries) -> Trajectory:
 def points(series: GaitSeries, name: str) -> Recording:
     """Return where joints, heels and toes are, `RATE` frames a second, as a recording."""
     frames = np.arange(int(series.duration * RATE) + 1) / RATE
-    places = [body_points(series.walker, q) for q in motion_table(series).at(frames)]
+    places = body_points(series.walker, motion_table(series).at(frames))
     ends = (point.name for point in series.walker.parts.frames)
     markers = (*(name for name in COORDINATES if name not in ROOT), *ends)
     positions = np.zeros((frames.size, len(markers), 3))
-    positions[..., [0, 2]] = [[place[marker] for marker in markers] for place in places]
+    positions[..., [0, 2]] = np.stack([places[marker] for marker in markers], axis=1)
     return Recording(name, RATE, markers, positions, (), (), 1)

@@ -114,6 +114,9 @@ further one is, the more bounds become active or inactive on the way to it, and 
 bounds steps are cut to a few per cent for dozens of iterations."""
 DIFFERENCE: Final = 1e-4
 """Relative change of a number of the problem by which its derivatives are taken."""
+WAY_SHARE: Final = 1e-2
+"""The same on the way to a neighbour, as a share of it: what it adds to the error is that share of
+the second order."""
 
 # Multiple shooting.
 SHOOTING_BARRIER: Final = 1e-5

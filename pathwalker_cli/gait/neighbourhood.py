@@ -128,19 +128,15 @@ class Neighbourhood:
         return Derivative(answer.cost * factor, below, above, step)
 
 
-def extrapolated(
-    optimum: Optimum, below: Optimum, above: Optimum, step: float, there: Optimum
-) -> Optimum:
-    """Return an optimum to first order where some of its numbers have changed; none is solved.
+def extrapolated(optimum: Optimum, there: Optimum) -> Optimum:
+    """Return an optimum to first order where numbers of its problem have changed; none is solved.
 
     Args:
         optimum: The optimum.
-        below: The same unknowns in the program of a step back.
-        above: The same unknowns in the program of a step on the way.
-        step: That step as a share of the way.
-        there: The same unknowns in the program at the end of the way.
+        there: The same unknowns in the program of the other numbers.
     """
-    return _moved_by(optimum, optimum.kkt.answer(below.program, above.program, step), 1.0, there)
+    answer = optimum.kkt.towards(there.program, choices.WAY_SHARE)
+    return _moved_by(optimum, answer, 1.0, there)
 
 
 def _moved_by(optimum: Optimum, answer: Answer, amount: float, there: Optimum) -> Optimum:

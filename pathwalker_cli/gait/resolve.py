@@ -15,7 +15,7 @@ from pathwalker_cli.gait.solution import GaitSolution
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.nlp.ipopt import NlpSolver, warm_pushes
+from pathwalker_cli.nlp.ipopt import NlpSolver, last_barrier, warm_pushes
 from pathwalker_cli.nlp.kkt import KktSystem
 from pathwalker_cli.nlp.result import Multipliers, NlpResult
 from pathwalker_cli.nlp.watch import Observer
@@ -30,7 +30,7 @@ class WarmStart:
     """How to begin with the multipliers of a neighbour.
 
     Args:
-        barrier: First barrier parameter; None for a tenth of the tolerance.
+        barrier: First barrier parameter; None for the last one, with which solves end.
         push: How far the start is moved off its bounds [solver units]; None for IPOPT's settings.
     """
 
@@ -184,16 +184,19 @@ class Resolver:
                 lead to a solution.
         """
         start = start or self.optimum
-        solver = GaitSolver(case)
-        program = self._program_of(solver)
-        unknowns, multipliers = start.result.unknowns, start.result.multipliers
-        result = self._warm(warm_start_for(program, unknowns)).solve(program, unknowns, multipliers)
+        return self.solved(self.restored(case, start.result), insist)
+
+    def solved(self, guess: Optimum, insist: bool = True) -> Optimum:
+        """Solve the problem of a neighbour from the unknowns and multipliers that it has."""
+        program, start = guess.program, guess.result.unknowns
+        warm = self._warm(warm_start_for(program, start))
+        result = warm.solve(program, start, guess.result.multipliers)
         if insist and not result.converged and result.status != "stopped by the user":
-            result = self._cold.solve(program, unknowns)
-        return Optimum(solver, program, result)
+            result = self._cold.solve(program, start)
+        return replace(guess, result=result)
 
     def restored(self, case: Case, result: NlpResult) -> Optimum:
-        """Return a neighbour that was solved before."""
+        """Return a neighbour with unknowns and multipliers that are known, its own or others'."""
         solver = GaitSolver(case)
         return Optimum(solver, self._program_of(solver), result)
 
@@ -204,7 +207,7 @@ class Resolver:
         """Return the solver that begins with multipliers in this way."""
         if start not in self._warm_solvers:
             solver = self._solver.config.solver
-            lowest = min(solver.refined_barrier, 0.1 * self._tolerance)
+            lowest = min(solver.refined_barrier, last_barrier(self._tolerance))
             settings = self._solver.settings(self._tolerance, start.barrier or lowest, warm=True)
             pushes = {} if start.push is None else warm_pushes(start.push)
             extra = {**choices.WATCHDOG, **pushes, **settings.extra}

@@ -58,7 +58,7 @@ def _postures(walker: Walker, q: np.ndarray) -> np.ndarray:
         stiffness = walker.values[joint.numbers[0].address]
         chain = ("pelvis_tilt", *(f"{name}_{s}" for name in LEG_JOINTS))
         pitch = completed[:, [walker.skeleton.index(name) for name in chain]].sum(axis=1)
-        height = walker.frames(completed)[f"toe_{s}"][:, 1]
+        height = walker.frames(completed, [f"toe_{s}"])[f"toe_{s}"][:, 1]
         level = np.arcsin(np.clip(height / length, -1.0, 1.0))  # pitch of toes that just touch
         load = stiffness * np.maximum(pitch - level, 0.0) / length
         depth = [depth_under(tip, each, walker.values, walker.weight) for each in load]

@@ -77,8 +77,8 @@ def frame_positions(model: pin.Model, q: np.ndarray, frames: Sequence[str]) -> n
     places = [model.getFrameId(frame) for frame in frames]
     positions = np.empty((q.size // model.nq, len(frames), 3))
     for row, pose in enumerate(q.reshape(-1, model.nq)):
-        pin.framesForwardKinematics(model, data, pose)
-        positions[row] = [data.oMf[place].translation for place in places]
+        pin.forwardKinematics(model, data, pose)
+        positions[row] = [pin.updateFramePlacement(model, data, k).translation for k in places]
     return positions[..., [0, 2]].reshape(*q.shape[:-1], len(frames), 2)
 
 

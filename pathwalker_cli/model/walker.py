@@ -382,9 +382,8 @@ class Walker:
         q = _vectors(q, self.skeleton.size, "q")
         return frame_positions(self.model, q, [point.name for point in POINTS])
 
-    def frames(self, q: Any) -> dict[str, np.ndarray]:
-        """Return where all frames are in q (..., 10): forward, up [m], (..., 2), by name."""
-        names = [frame.name for frame in self.model.frames]
+    def frames(self, q: Any, names: Sequence[str]) -> dict[str, np.ndarray]:
+        """Return where frames are in q (..., 10): forward, up [m], (..., 2), by name."""
         places = frame_positions(self.model, _vectors(q, self.skeleton.size, "q"), names)
         return dict(zip(names, np.moveaxis(places, -2, 0), strict=True))
 

@@ -32,6 +32,9 @@ _METHOD: Final = {
 _BARRIER_DECREASE: Final = 0.05
 """Of a cold start.  Barrier problems are only a path to the solution: few of them are enough."""
 
+_BARRIER_TOLERANCE: Final = 10.0
+"""Of IPOPT (`barrier_tol_factor`): error at which it leaves a barrier, as a multiple of it."""
+
 _LARGEST_PUSH, _PUSH_SHARE = 1e-4, 0.1
 """Warm starts on a bound are moved off it by about what the barrier would ask for: by this share of
 the barrier parameter, and no further than the first [solver units]."""
@@ -75,6 +78,14 @@ class IpoptSettings:
         else:
             options["mu_linear_decrease_factor"] = _BARRIER_DECREASE
         return {**options, **self.extra}
+
+
+def last_barrier(tolerance: float) -> float:
+    """Return the barrier parameter with which a solve to this tolerance ends.
+
+    A warm start that begins with it needs no steps from one barrier to the next.
+    """
+    return tolerance / (1.0 + _BARRIER_TOLERANCE)
 
 
 def warm_pushes(distance: float) -> dict[str, Any]:

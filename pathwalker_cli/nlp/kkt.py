@@ -20,11 +20,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from scipy import sparse
 
+from pathwalker_cli.nlp.matrices import matrix_of
 from pathwalker_cli.nlp.program import Program, limits
 from pathwalker_cli.nlp.result import NlpResult
 from pathwalker_cli.nlp.stage_ldl import SymmetricSystem, in_order_of
@@ -80,6 +81,22 @@ class NewtonStep:
     unknowns: np.ndarray
     by_unknowns: np.ndarray
     by_rows: np.ndarray
+
+
+class _FirstOrder(NamedTuple):
+    """Objective, gradient of the Lagrangian (n,) and rows (m,), or derivatives of these."""
+
+    objective: float
+    gradient: np.ndarray
+    rows: np.ndarray
+
+    def slope_to(self, other: _FirstOrder, span: float) -> _FirstOrder:
+        """Return the difference to another one over a span."""
+        return _FirstOrder(
+            (other.objective - self.objective) / span,
+            (other.gradient - self.gradient) / span,
+            (other.rows - self.rows) / span,
+        )
 
 
 @dataclass(frozen=True)
@@ -140,10 +157,19 @@ class KktSystem:
 
         The number is one step lower in the program `below` and one higher in `above`.
         """
-        change = self._change(below, above, step)
-        answer = self._answer(change)
-        pull = self._pull(answer) + change.gradient[self.free]
-        return self._followed(answer, pull, list(range(len(self.free))))
+        low, high = (self._first_order_at(program.parameters) for program in (below, above))
+        moved = self._pressed_by(above) - self._pressed_by(below)
+        return self._following(low.slope_to(high, 2.0 * step), moved / (2.0 * step))
+
+    def towards(self, other: Program, share: float) -> Answer:
+        """Return the changes on the way to a program of other numbers, to first order.
+
+        Derivatives are taken over this share of the way; free parameters follow.
+        """
+        here, there = self.program.parameters, other.parameters
+        near = self._first_order_at(here + share * (there - here))
+        moved = self._pressed_by(other) - self._pressed_by(self.program)
+        return self._following(self._own_first_order.slope_to(near, share), moved)
 
     @cached_property
     def step(self) -> NewtonStep:
@@ -212,34 +238,44 @@ class KktSystem:
     @cached_property
     def parameter_gradient(self) -> np.ndarray:
         """First derivatives of the optimal cost in the free parameters (scaled)."""
-        return np.asarray(self._own_first_order[1][self.free])
+        return np.asarray(self._own_first_order.gradient[self.free])
 
     @cached_property
-    def _own_first_order(self) -> tuple[float, np.ndarray, np.ndarray]:
-        return self._first_order_of(self.program)
+    def _own_first_order(self) -> _FirstOrder:
+        return self._first_order_at(self.program.parameters)
 
-    def _first_order(self, program: Program) -> tuple[float, np.ndarray, np.ndarray]:
-        """Return objective, gradient of the Lagrangian and rows of a program at the optimum."""
-        return self._own_first_order if program is self.program else self._first_order_of(program)
-
-    def _first_order_of(self, program: Program) -> tuple[float, np.ndarray, np.ndarray]:
-        x, p = self.result.unknowns, program.parameters
+    def _first_order_at(self, p: np.ndarray) -> _FirstOrder:
+        """Return objective, gradient of the Lagrangian and rows at the optimum, of numbers p."""
+        x = self.result.unknowns
         objective, gradient = self._functions["grad_f"](x, p)
-        rows, jacobian = self._functions["jac_g"](x, p)
-        lagrangian = np.asarray(gradient).ravel()
-        lagrangian = lagrangian + jacobian.sparse().T @ self.result.multipliers.rows
-        return float(objective), lagrangian, np.asarray(rows).ravel()
+        rows, jacobian = self._rows_at(x, p)
+        lagrangian = np.asarray(gradient).ravel() + jacobian.T @ self.result.multipliers.rows
+        return _FirstOrder(float(objective), lagrangian, rows)
 
-    def _change(self, below: Program, above: Program, step: float) -> _Change:
-        low, high = self._first_order(below), self._first_order(above)
-        objective = (high[0] - low[0]) / (2 * step)
-        gradient, rows = ((b - a) / (2 * step) for a, b in zip(low[1:], high[1:], strict=True))
+    def _rows_at(self, x: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, sparse.csc_array]:
+        """Return the rows (m,) and their Jacobian (m, n)."""
+        function = self._functions["jac_g"]
+        rows, jacobian = function(x, p)
+        return np.asarray(rows).ravel(), matrix_of(function, jacobian)
+
+    def _pressed_by(self, program: Program) -> np.ndarray:
+        """Return the bounds of a program that unknowns and rows press on, shape (n + m,)."""
+        return _pressed(self.result.multipliers.stacked, *limits(program))
+
+    def _following(self, slope: _FirstOrder, moved: np.ndarray) -> Answer:
+        """Return the derivatives while all free parameters follow.
+
+        Args:
+            slope: Derivatives at fixed unknowns and multipliers.
+            moved: Those of the bounds that unknowns and rows press on, shape (n + m,).
+        """
         multipliers, size = self.result.multipliers, self.program.size
-        pressed = (_pressed(multipliers.stacked, *limits(k)) for k in (below, above))
-        moved = np.subtract(*reversed(list(pressed))) / (2 * step)
-        bounds, rows = moved[:size], rows - moved[size:]
-        weighted = objective + multipliers.rows @ rows - multipliers.unknowns @ bounds
-        return _Change(float(weighted), gradient, rows, bounds)
+        bounds, rows = moved[:size], slope.rows - moved[size:]
+        weighted = slope.objective + multipliers.rows @ rows - multipliers.unknowns @ bounds
+        change = _Change(float(weighted), slope.gradient, rows, bounds)
+        answer = self._answer(change)
+        pull = self._pull(answer) + change.gradient[self.free]
+        return self._followed(answer, pull, list(range(len(self.free))))
 
     def _answer(self, change: _Change) -> Answer:
         """Return the derivatives, free parameters moving as `change.bounds` says."""
@@ -264,9 +300,10 @@ class KktSystem:
     def _second_order(self) -> tuple[Any, Any]:
         """Hessian of the Lagrangian (n, n) and Jacobian of the rows (m, n)."""
         x, p = self.result.unknowns, self.program.parameters
-        triangle = self._functions["hess_lag"](x, p, 1.0, self.result.multipliers.rows).sparse()
-        _, jacobian = self._functions["jac_g"](x, p)
-        return (triangle + sparse.triu(triangle, 1).T).tocsr(), jacobian.sparse().tocsr()
+        function = self._functions["hess_lag"]
+        triangle = matrix_of(function, function(x, p, 1.0, self.result.multipliers.rows))
+        _, jacobian = self._rows_at(x, p)
+        return (triangle + sparse.triu(triangle, 1).T).tocsr(), jacobian.tocsr()
 
     @cached_property
     def factors(self) -> SymmetricSystem:

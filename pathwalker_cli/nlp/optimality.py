@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from pathwalker_cli.nlp.matrices import matrix_of
 from pathwalker_cli.nlp.program import Program, limits
 from pathwalker_cli.nlp.result import Multipliers
 
@@ -45,8 +46,8 @@ def optimality(program: Program, unknowns: np.ndarray, multipliers: Multipliers)
     functions = program.plain_functions()
     cost, gradient = functions["grad_f"](unknowns, program.parameters)
     rows, jacobian = functions["jac_g"](unknowns, program.parameters)
-    rows = np.asarray(rows).ravel()
-    lagrangian = np.asarray(gradient).ravel() + jacobian.sparse().T @ multipliers.rows
+    rows, jacobian = np.asarray(rows).ravel(), matrix_of(functions["jac_g"], jacobian)
+    lagrangian = np.asarray(gradient).ravel() + jacobian.T @ multipliers.rows
     lagrangian = lagrangian + multipliers.unknowns
     values = np.concatenate([unknowns, rows])
     (lower, upper), both = limits(program), multipliers.stacked

@@ -12,7 +12,7 @@ import numpy as np
 from pathwalker_cli.nlp.blocks import Occurrences
 from pathwalker_cli.ocp.collocation_blocks import CollocationBlocks
 from pathwalker_cli.ocp.elimination import StageKeys
-from pathwalker_cli.ocp.layout import NODE, Bounded, PhasePlaces, collocation_layout
+from pathwalker_cli.ocp.layout import NODE, Bounded, Layout, PhasePlaces, collocation_layout
 from pathwalker_cli.ocp.phased import (
     PhasedMotion,
     PhaseMotion,
@@ -29,6 +29,7 @@ class CollocationProgram(Transcription[PhasePlaces]):
 
     Args:
         meshes: Node positions of every phase, from 0 to 1.
+        layout: Places of the unknowns, if they are known.
     """
 
     def __init__(
@@ -36,14 +37,15 @@ class CollocationProgram(Transcription[PhasePlaces]):
         blocks: CollocationBlocks,
         numbers: ProblemNumbers,
         meshes: tuple[np.ndarray, ...],
+        layout: Layout[PhasePlaces] | None = None,
     ) -> None:
         self.blocks = blocks
-        layout = collocation_layout(blocks.problem, meshes, blocks.degree)
+        layout = layout or collocation_layout(blocks.problem, meshes, blocks.degree)
         super().__init__(blocks.problem, numbers, meshes, layout)
 
     def with_numbers(self, numbers: ProblemNumbers) -> CollocationProgram:
         """Return the program with other numbers; both evaluate the same functions."""
-        program = CollocationProgram(self.blocks, numbers, self.meshes)
+        program = CollocationProgram(self.blocks, numbers, self.meshes, self.layout)
         program.functions = self.functions
         return program
 

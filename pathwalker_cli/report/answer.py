@@ -15,7 +15,7 @@ from pathwalker_cli.report.springs import left_open, prescribed, recommended
 from pathwalker_cli.report.summaries import SensitivitySummary, UncertaintySummary
 from pathwalker_cli.results.text import interesting
 from pathwalker_cli.studies.sensitivity.result import SHOWN, label_of
-from pathwalker_cli.studies.verdict.words import stop_warnings
+from pathwalker_cli.studies.verdict.words import stop_sentence
 
 _KINDS = {
     "dorsiflexion": "the spring against the shin leaning forward (K_D)",
@@ -168,8 +168,8 @@ def _hinges(run: ReportRun) -> Iterator[str]:
     verdict = run.verdict
     if verdict is None:
         return
-    for warning in stop_warnings(verdict):
-        yield f"{named}{warning}"
+    if sentence := stop_sentence(verdict):
+        yield f"{named}{sentence}"
     if verdict.starts < 2:
         yield f"{named}one local optimum; others were not searched for (starts: 8 does)"
 

@@ -32,8 +32,9 @@ _TWO_FEET: Final = re.compile(r"\b(right|left)_(toe|flat)_(right|left)_(heel|fla
 _SIDE: Final = {suffix: side for side, suffix in SUFFIX.items()}
 _MANY: Final = 5
 """Values of one part of a config up to which each is told; config.resolved.yaml tells all."""
-_PLACES: Final = 2
+_PLACES: Final = 1
 """Phases up to which each is told; metrics.json tells all."""
+_ANGLE: Final = re.compile(r"-?[\d.]+ rad \((-?[\d.]+ deg)\)")
 _HASH: Final = 12
 """Digits of a hash that tell files apart."""
 
@@ -113,7 +114,8 @@ def _changes(config: StudyConfig) -> Iterator[str]:
 def _bounds(result: RunMetrics) -> Iterator[str]:
     """Yield the active bounds that are choices, where they come from, and how many others."""
     chosen = [bound for bound in result.bounds if interesting(bound)]
-    yield from (in_words(bound_line(_short_places(bound))) for bound in chosen)
+    lines = (bound_line(_short_places(bound)) for bound in chosen)
+    yield from (in_words(_ANGLE.sub(r"\1", line)) for line in lines)
     given = result.bound_sources or {}
     sources = {b.name: given[b.name] for b in chosen if b.name in given}
     yield from source_lines(sources)

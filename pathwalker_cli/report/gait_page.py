@@ -16,7 +16,7 @@ from pathwalker_cli.report.springs import spring_section
 from pathwalker_cli.report.study_tables import study_section
 from pathwalker_cli.stride.measure import Measure
 from pathwalker_cli.stride.measures import expanded, measures_in
-from pathwalker_cli.studies.verdict.words import snapped_warning, stop_warnings
+from pathwalker_cli.studies.verdict.words import snapped_warning, stop_sentence
 
 
 def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
@@ -71,10 +71,10 @@ def _warnings(runs: Sequence[ReportRun]) -> list[str]:
             )
         if run.verdict is not None and (warning := snapped_warning(run.verdict)):
             warnings.append(f"{run.label}, springs to take: {warning}")
-        if run.verdict is not None and next(stop_warnings(run.verdict), ""):
+        if run.verdict is not None and stop_sentence(run.verdict):
             warnings.append(
-                f"{run.label}: hard stops carry much of what the orthoses exert; what the answer "
-                "hangs on tells how much, and what stiffer ones would change"
+                f"{run.label}: hard stops carry much of what the orthoses exert; how much, and "
+                "what stiffer ones would change, stands below"
             )
         if _coarse(run):
             warnings.append(

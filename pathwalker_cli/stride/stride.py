@@ -427,12 +427,11 @@ def body_points(walker: Walker, q: np.ndarray) -> dict[str, np.ndarray]:
 
     Args:
         walker: Who walks.
-        q: Generalised coordinates, shape (10,).
+        q: Generalised coordinates, shape (10,), or (n, 10) for positions of shape (n, 2).
     """
-    frames = walker.frames(q)
     ends = ("hip", "knee", "ankle", "heel", "toe", *(["tip"] if walker.parts.toes else []))
     legs = [f"{name}_{s}" for name in ends for s in "rl"]
-    points = {name: frames[name] for name in (*legs, "lumbar", "head")}
+    points = walker.frames(q, (*legs, "lumbar", "head"))
     points["neck"] = points.pop("head")
     points["head"] = points["neck"] + 0.25 * (points["neck"] - points["lumbar"])
     return points

@@ -55,7 +55,7 @@ def walks_figure(walks: Sequence[tuple[str, Stride]]) -> Figure:
     Args:
         walks: What to call each, and the walk.
     """
-    fig = style.new_figure(0.48 + 1.62 * len(walks), style.PAGE)
+    fig = style.new_figure(0.72 + 1.39 * len(walks), style.PAGE)
     panels = fig.subplots(len(walks), 1, squeeze=False)[:, 0]
     for ax, (label, stride) in zip(panels, walks, strict=True):
         _draw_row(ax, stride, sum(_ROWS, ()))

@@ -6,11 +6,12 @@ No problem is solved again, except where a check by finite differences is asked 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final
 
 from pathwalker_cli.case import Case
+from pathwalker_cli.conventions import SIDES
 from pathwalker_cli.errors import ConfigError, NotConvergedError
 from pathwalker_cli.gait.bounds import held
 from pathwalker_cli.gait.neighbourhood import Neighbourhood
@@ -84,27 +85,36 @@ def asked_places(asked: SensitivityStudy, solver: GaitSolver) -> tuple[str, ...]
     """Return the numbers that a study asks about: those that are free, and places in the file.
 
     A place whose number the problem chooses itself changes nothing, and is left out.
-
-    Raises:
-        ConfigError: If a check is asked for what is not asked about.
     """
     free, walker = solver.free, solver.walker
     chosen = {place for u in free for place in (u.address, *u.addresses)}
     usual = default_places(walker.patient, solver.config.condition == "orthosis")
     usual += tuple(place for place in walker.patient.numbers if walker.values.get(place))
     given = asked.places or tuple(place for place in usual if place not in chosen)
-    places = (*(u.name for u in free), *given)
-    unknown = [place for place in asked.check if place not in places]
-    if unknown:
-        raise ConfigError(f"names {unknown[0]}", where="check", allowed=", ".join(places))
-    return places
+    return (*(u.name for u in free), *given)
+
+
+def asked_checks(asked: SensitivityStudy, places: Sequence[str]) -> tuple[str, ...]:
+    """Return the numbers whose answers are checked; a name without a side stands for both sides.
+
+    Raises:
+        ConfigError: If a check is asked for what is not asked about.
+    """
+    found: list[str] = []
+    for name in asked.check:
+        named = [p for p in places if p in (name, *(f"{name}_{side}" for side in SIDES))]
+        if not named:
+            raise ConfigError(f"names {name}", where="check", allowed=", ".join(places))
+        found += named
+    return tuple(found)
 
 
 def plan(asked: SensitivityStudy, solver: GaitSolver) -> Plan:
     """Return what would be asked about.
 
     Raises:
-        ConfigError: If a place does not exist, or cannot change alone in half a cycle.
+        ConfigError: If a place does not exist or cannot change alone in half a cycle, or if a check
+            is asked for what is not asked about.
     """
     places = asked_places(asked, solver)
     for place in places[len(solver.free) :]:
@@ -117,7 +127,7 @@ def plan(asked: SensitivityStudy, solver: GaitSolver) -> Plan:
             ) from None
         if solver.config.half_cycle:
             require_symmetry(Case(solver.config, patient).walker(solver.config.model.backend))
-    count = len(asked.check)
+    count = len(asked_checks(asked, places))
     does = f"{len(places)} numbers asked about; two solves for each of {count} checks"
     return Plan(does, 2 * count)
 
@@ -135,6 +145,7 @@ def sensitivities(asked: SensitivityStudy, run: Run, work: Work) -> Sensitivitie
     around = Neighbourhood(resolver)
     began = time.perf_counter()
     places = asked_places(asked, around.optimum.solver)
+    checked = asked_checks(asked, places)
     base = all_measures(around.optimum)
     rows = tuple(_sensitivity(around, place, base) for place in places)
     seconds = time.perf_counter() - began
@@ -145,9 +156,7 @@ def sensitivities(asked: SensitivityStudy, run: Run, work: Work) -> Sensitivitie
         tolerance=asked.tolerance,
         base=base,
         rows=rows,
-        checks=tuple(
-            _check(around, journal, case, place, asked.check_step) for place in asked.check
-        ),
+        checks=tuple(_check(around, journal, case, place, asked.check_step) for place in checked),
         active=around.kkt.active,
         doubtful=around.kkt.doubtful,
         seconds=seconds,

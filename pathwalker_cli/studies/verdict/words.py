@@ -163,6 +163,18 @@ def stop_warnings(verdict: Verdict) -> Iterator[str]:
         yield f"with {twice.factor:g} times the stiffness of these stops: {twice.status}"
 
 
+def stop_sentence(verdict: Verdict) -> str:
+    """Return the same in a sentence for a page that has the shares elsewhere; "" if none."""
+    warnings = list(stop_warnings(verdict))
+    if not warnings:
+        return ""
+    words = (
+        "hard stops carry much of what the orthoses exert, so how stiff they are decides as the "
+        "springs do: measure it (orthosis.stop_stiffness)"
+    )
+    return "; ".join([words, *warnings[1:][-1:]])
+
+
 def _changes(verdict: Verdict, changes: Mapping[str, float]) -> str:
     """Return how the cost moves, then every number and measure that does so visibly."""
     numbers = {number.name: number for number in (*verdict.springs, *verdict.numbers)}
