@@ -255,7 +255,7 @@ def test_a_foot_is_off_the_ground_when_its_toes_are() -> None:
 def test_a_walk_is_given_toes_that_lie_on_the_ground(tmp_path: Path) -> None:
     solver = toed_solver()
     walker = solver.walker
-    plain = typical_walks(walker.flat_footed)[0].scaled(walker, solver.parameter_guess())
+    plain = typical_walks(walker.as_recorded)[0].scaled(walker, solver.parameter_guess())
     motion = with_toes(walker, plain)
     deepest = 0.0
     for phase in motion.phases:

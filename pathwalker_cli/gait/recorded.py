@@ -79,7 +79,7 @@ def recorded_stride(walker: Walker, recording: CompactRecording) -> ReferenceStr
     pairs = zip(gaps, choices.PHASE_SPLITS, strict=True)
     durations = np.array([part for gap, s in pairs for part in (gap * s, gap - gap * s)])
     closed[:, _TX] -= closed[0, _TX]
-    closed[:, _TZ] -= np.mean([walker.flat_footed.foot_points(q)[:, 1].min() for q in closed])
+    closed[:, _TZ] -= np.mean([walker.as_recorded.foot_points(q)[:, 1].min() for q in closed])
     grid = np.linspace(0.0, period, len(closed))
     phases, name = walker.pattern.durations(durations), f"recording {recording.name}"
     return ReferenceStride(name, _of_all_joints(walker, grid, closed), phases)
@@ -96,7 +96,7 @@ def recorded_passage(walker: Walker, recording: CompactRecording) -> ReferenceSt
         DataError: If the recording holds no such stride.
     """
     motion = recording.motion
-    heights = np.array([walker.flat_footed.foot_points(q)[:, 1] for q in motion.values])
+    heights = np.array([walker.as_recorded.foot_points(q)[:, 1] for q in motion.values])
     cuts = _phase_frames(_passage_frames(recording), heights, recording.name)
     part = slice(cuts[0], cuts[-1] + 1)
     values = motion.values[part].copy()

@@ -93,6 +93,11 @@ class GaitSeries(Sampled):
         return self.walker.device_torques(self.element_force)
 
     @cached_property
+    def cuff_force(self) -> np.ndarray:
+        """Forces of the cuffs on the legs [N], (n, 4); see `Walker.cuff_forces`."""
+        return self.walker.cuff_forces(self.q, self.v, self.element_force)
+
+    @cached_property
     def passive_torque(self) -> dict[str, np.ndarray]:
         """Torque of passive tissue by coordinate [N m], each (n,); empty without tissue."""
         tissue = self.walker.tissue
@@ -119,6 +124,11 @@ class GaitSeries(Sampled):
     def net_torque(self) -> np.ndarray:
         """Sum of the forces of all elements per coordinate [N m], shape (n, 10)."""
         return self.walker.generalised_forces(self.element_force)
+
+    @cached_property
+    def joint_torque(self) -> np.ndarray:
+        """The same as the joints of the body feel it, (n, 10); see `Walker.joint_torques_of`."""
+        return self.walker.joint_torques_of(self.net_torque)
 
     @cached_property
     def quadrature(self) -> np.ndarray:
