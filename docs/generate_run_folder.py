@@ -249,7 +249,7 @@ def _standing() -> GaitSeries:
     sizes = {"q": len(COORDINATES), "v": len(COORDINATES), "vdot": len(COORDINATES),
              "activation": len(GENERATORS), "activation_rate": len(GENERATORS),
              "force": len(CONTACT_FORCES), "reserve": len(COORDINATES),
-             "element_force": len(walker.elements)}  # fmt: skip
+             "element_force": sum(len(e.coordinates) for e in walker.elements)}  # fmt: skip
     zeros: dict[str, Any] = {name: np.zeros((1, size)) for name, size in sizes.items()}
     return GaitSeries(walker, None, np.zeros(1), (PHASE_NAMES[0],), **zeros)  # type: ignore[arg-type]
 
