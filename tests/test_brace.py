@@ -12,6 +12,7 @@ import pinocchio as pin
 import pytest
 import yaml
 
+from figure_measure import complaints
 from helpers import stylised_series
 from pathwalker_cli.animation.drawing import drawing
 from pathwalker_cli.animation.frames import gait_frames
@@ -31,6 +32,7 @@ from pathwalker_cli.gait.typical import typical_walks
 from pathwalker_cli.model.skeleton import PLANAR_WALKER, Side, walker_skeleton
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
+from pathwalker_cli.patient.variation import Variation, varied
 from pathwalker_cli.results.tables import forces_table, torques_table
 from pathwalker_cli.stride.balance import balance
 from pathwalker_cli.stride.figures.save import figure_names, make_figure
@@ -388,7 +390,8 @@ def test_shells_are_drawn_where_they_are(series: GaitSeries) -> None:
     points = body_points(series.walker, zero)
     wanted = 0.3 * points["knee_r"] + 0.7 * points["ankle_r"]
     assert at == pytest.approx(wanted, abs=1e-9)
-    assert "orthosis_curves" in figure_names(series)
+    assert {"orthosis_curves", "cuffs"} <= set(figure_names(series))
+    assert complaints(make_figure("cuffs", series)) == []
     curve = make_figure("orthosis_curves", series).axes[0].get_lines()
     walked = -np.rad2deg(series.q[:, HINGES[0]])
     spans = [line.get_xdata() for line in curve if len(line.get_xdata()) > 2]
@@ -413,6 +416,18 @@ def test_places_of_hinges_and_cuffs_can_be_found_by_the_optimiser() -> None:
     assert theta == pytest.approx(moved.rigid_body.parameters, abs=1e-12)
     with pytest.raises(ConfigError, match=r"reaches 0\.2 m"):
         solver_of(free={"orthosis.hinge.up": (0.0, 0.2)})
+
+
+@pytest.mark.parametrize(
+    ("place", "before"),
+    [("orthosis.hinge.forward", 0.0), ("orthosis.hinge.up.left", 0.0),
+     ("orthosis.cuff_height", 0.7 * 0.2927), ("orthosis.cuff_area.left", 0.06 * 0.2927**2)],
+)  # fmt: skip
+def test_places_that_the_file_leaves_out_can_be_varied(place: str, before: float) -> None:
+    changed = varied(PATIENT, Variation(shift={place: 0.002}))
+    address = place if place.endswith("left") else f"{place}.left"
+    assert changed.number(address) == pytest.approx(before + 0.002)
+    assert varied(PATIENT, Variation(scale={"body_mass": 1.1})).orthosis == PATIENT.orthosis
 
 
 def test_left_and_right_cuffs_that_differ_are_no_half_cycle() -> None:

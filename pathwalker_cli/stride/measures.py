@@ -206,13 +206,6 @@ def _of_shell(of: Callable[[Stride, Side], float]) -> Callable[[Stride, Side], f
     return measured
 
 
-def _cuff_shift(stride: Stride, side: Side, axis: int) -> np.ndarray:
-    """Return how far a cuff is off its place on the leg, across (0) or along (1); (n,) [m]."""
-    walker = stride.walker
-    state = walker.state(stride.q.T, stride.velocity.T, [None] * len(GENERATORS))
-    return np.asarray(walker.device.cuffs[side].shift(state, walker.values)[axis])
-
-
 def _beside(stride: Stride, side: Side) -> float:
     """Return the largest difference of the angles of ankle and hinge [rad]."""
     ankle, hinge = (stride.column(f"{joint}_{SUFFIX[side]}") for joint in ("ankle", "hinge"))
@@ -366,10 +359,10 @@ REGISTRY: tuple[Measure, ...] = (
               _of_shell(lambda s, side: np.abs(_cuff_forces(s, side, 1)).max()), section=LOADS),
     *per_side("pistoning_*", "pistoning, *", "m",
               "how far the cuff slides along the leg, from its lowest to its highest; likewise",
-              _of_shell(lambda s, side: np.ptp(_cuff_shift(s, side, 1))), section=LOADS),
+              _of_shell(lambda s, side: np.ptp(s.cuff_shift(side)[:, 1])), section=LOADS),
     *per_side("cuff_depth_*", "cuff into the leg, *", "m",
               "how deep the cuff is pressed into shin or calf at most; likewise",
-              _of_shell(lambda s, side: np.abs(_cuff_shift(s, side, 0)).max()), section=LOADS),
+              _of_shell(lambda s, side: np.abs(s.cuff_shift(side)[:, 0]).max()), section=LOADS),
     *per_side("hinge_difference_*", "ankle beside hinge, *", "rad",
               "largest difference of the angles of ankle and hinge; likewise", _of_shell(_beside),
               section=LOADS),

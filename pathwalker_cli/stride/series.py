@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pathwalker_cli.model.elements.muscle import excitation_from_rate
+from pathwalker_cli.model.skeleton import Side
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 
@@ -37,6 +38,15 @@ class Sampled:
     def column(self, coordinate: str) -> np.ndarray:
         """Return one generalised coordinate over time, shape (n,)."""
         return np.asarray(self.q[:, self.walker.skeleton.index(coordinate)])
+
+    def cuff_shift(self, side: Side) -> np.ndarray:
+        """Return how far the cuff of a side is off its place on the leg, see `Cuff.shift`; [m].
+
+        Across the shank and along it, shape (n, 2).
+        """
+        walker = self.walker
+        state = walker.state(self.q.T, 0.0 * self.q.T, [None] * len(walker.muscles))
+        return np.stack(walker.device.cuffs[side].shift(state, walker.values), axis=1)
 
 
 @dataclass(frozen=True)
