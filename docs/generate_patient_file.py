@@ -107,7 +107,7 @@ MEANINGS: Final = {
     "examination.knee_extension": "negative where the knee does not straighten; typical 0",
     "examination.dorsiflexion_knee_extended": "with the knee straight; typical 13",
     "examination.dorsiflexion_knee_flexed": "with the knee at 90; typical 32",
-    "orthosis.cuff_height": "middle of the cuff above the hinge, for its force on the leg; left out: 0.7 of the shank",
+    "orthosis.cuff_height": "middle of the cuff above the ankle, for its force on the leg; left out: 0.7 of the shank",
     "orthosis.cuff_area": "area on which the cuff presses, in front or behind; left out: 0.06 of the squared shank",
     "orthosis.hinge.forward": "hinge of the shell in front of the ankle, in the frame of the foot, with `model.orthosis: body`; "
     "left out: 0, on the axis",

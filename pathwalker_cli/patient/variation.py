@@ -26,7 +26,7 @@ _LISTED: Final = 5
 """Numbers of a config that are told one by one."""
 
 Factor = Annotated[float, Quantity("", 0.01, 100.0)]
-Shift = Annotated[float, Quantity("SI units", -100.0, 100.0)]
+Shift = Annotated[float, Quantity("SI units", -1e6, 1e6)]
 
 
 class Variation(YamlModel):
