@@ -69,7 +69,7 @@ Durations = Annotated[tuple[Seconds, Seconds], AS_TUPLE, ORDERED]
 StiffnessRange = Annotated[
     tuple[Stiffness, Stiffness], AS_TUPLE, BeforeValidator(_no_number), ORDERED
 ]
-Amount = Annotated[float, Quantity("SI units", -1e7, 1e7)]
+Amount = Annotated[float, Quantity("SI units", -1e8, 1e8)]
 AmountRange = Annotated[tuple[Amount, Amount], AS_TUPLE, BeforeValidator(_no_number), ORDERED]
 
 

@@ -199,7 +199,7 @@ class SpringSet(YamlModel):
 
 
 _HingePlace = Annotated[float, Quantity("m", -0.1, 0.1, *["is it in millimetres?"] * 2)]
-_CuffStiffness = Annotated[float, Quantity("N/m", 100.0, 1e7, below="is it in N/mm?")]
+_CuffStiffness = Annotated[float, Quantity("N/m", 100.0, 1e8, below="is it in N/mm?")]
 _CuffDamping = Annotated[float, Quantity("N s/m", 0.0, 1e6, below="give its size, unsigned")]
 
 _STEEPEST: Final = 250.0

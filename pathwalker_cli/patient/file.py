@@ -85,7 +85,7 @@ class Patient(YamlModel):
     examination: Examination = Examination()
     orthosis: OrthosisData | None = None
     recorded: dict[Condition, Recorded] = Field(default_factory=dict)
-    numbers: dict[str, Annotated[float, Quantity("SI units", -1e7, 1e7)]] = Field(
+    numbers: dict[str, Annotated[float, Quantity("SI units", -1e8, 1e8)]] = Field(
         default_factory=dict
     )
     _origin: _Origin = PrivateAttr(default=_Origin())
