@@ -137,7 +137,7 @@ def _cuff(metrics: Mapping[str, Any], side: str) -> str:
     into, beside = (metrics[f"{name}_{side}"] for name in ("cuff_depth", "hinge_difference"))
     return (
         f"{text}, {1000.0 * into:.1f} mm into the leg, sliding {1000.0 * slides:.1f} mm, ankle "
-        f"{np.rad2deg(beside):.1f} deg beside the hinge"
+        f"{np.rad2deg(beside):.1f} deg against the hinge"
     )
 
 
