@@ -107,8 +107,16 @@ MEANINGS: Final = {
     "examination.knee_extension": "negative where the knee does not straighten; typical 0",
     "examination.dorsiflexion_knee_extended": "with the knee straight; typical 13",
     "examination.dorsiflexion_knee_flexed": "with the knee at 90; typical 32",
-    "orthosis.cuff_height": "middle of the cuff above the hinge, for its force on the leg; left out: 0.7 of the shank",
+    "orthosis.cuff_height": "middle of the cuff above the ankle, for its force on the leg; left out: 0.7 of the shank",
     "orthosis.cuff_area": "area on which the cuff presses, in front or behind; left out: 0.06 of the squared shank",
+    "orthosis.hinge.forward": "hinge of the shell in front of the ankle, in the frame of the foot, with `model.orthosis: body`; "
+    "left out: 0, on the axis",
+    "orthosis.hinge.up": "the same above the ankle",
+    "orthosis.cuff_stiffness.across": "force on the leg by how deep the cuff is pressed into it, with `model.orthosis: body`; left "
+    "out: 60 kPa times the area of the cuff, over 0.06 of the shank",
+    "orthosis.cuff_stiffness.along": "force by how far the cuff slides along the leg; left out: a third of it across",
+    "orthosis.cuff_damping.across": "force by speed; left out: the stiffness times 10 ms",
+    "orthosis.cuff_damping.along": "the same along the leg",
     "orthosis.sides": "the legs that wear one",
     "orthosis.mass.shank": "what orthosis and shoe add to the shank",
     "orthosis.mass.foot": "the same of the foot",

@@ -45,7 +45,7 @@ FILES: Final = {
     "controls.csv": "excitations and activation rates over time",
     "forces.csv": "ground reaction forces over time",
     "torques.csv": "torques of muscles and orthoses over time; with `model.tissue: true` those of passive tissue too",
-    "figures": f"{', '.join(f'`{name}`' for name in FIGURES)}; PNG and SVG. `orthosis_curves` with orthoses, `toe_joints` with `model.toes` only",
+    "figures": f"{', '.join(f'`{name}`' for name in FIGURES)}; PNG and SVG. `orthosis_curves` with orthoses, `toe_joints` with `model.toes`, `cuffs` with `model.orthosis: body` only",
     "config.resolved.yaml": "the config of the run with every default and override written out; can be solved again",
     "patient.yaml": "the patient as read, before any variation of the config, the orthosis in its place; whatever "
     "stands on the run takes this one, and with it the folder is enough to [verify and repeat](verification.md) the run",
@@ -249,7 +249,7 @@ def _standing() -> GaitSeries:
     sizes = {"q": len(COORDINATES), "v": len(COORDINATES), "vdot": len(COORDINATES),
              "activation": len(GENERATORS), "activation_rate": len(GENERATORS),
              "force": len(CONTACT_FORCES), "reserve": len(COORDINATES),
-             "element_force": len(walker.elements)}  # fmt: skip
+             "element_force": sum(len(e.coordinates) for e in walker.elements)}  # fmt: skip
     zeros: dict[str, Any] = {name: np.zeros((1, size)) for name, size in sizes.items()}
     return GaitSeries(walker, None, np.zeros(1), (PHASE_NAMES[0],), **zeros)  # type: ignore[arg-type]
 

@@ -72,7 +72,7 @@ class Case:
         model, condition = self.config.model, self.config.condition
         return Parts(
             condition, model.tissue, model.feet, model.uses, model.elements,
-            self.patient.braced(condition), model.toes,
+            self.patient.braced(condition), model.toes, model.orthosis,
         )  # fmt: skip
 
     def walker(self, backend: str = "auto") -> Walker:

@@ -145,14 +145,14 @@ def test_derivatives_of_running_costs_are_those_of_differences(name: str, phase:
     def costs(x: np.ndarray) -> np.ndarray:
         parts = [list(part) for part in np.split(x, np.cumsum(sizes)[:-1])]
         point = Instant(
-            phase, *parts, heights=parts[0][:2], speeds=parts[1][:2], worn=parts[0][2:4]
+            phase, *parts, heights=parts[0][:2], speeds=parts[1][:2], cuffs=parts[0][2:6]
         )
         return np.array(goals.integrands(point, numbers, goals.goals), dtype=float)
 
     x = ca.SX.sym("x", sum(sizes))
     parts = [ca.vertsplit(part) for part in ca.vertsplit(x, [0, *np.cumsum(sizes).tolist()])]
     point_of_symbols = Instant(
-        phase, *parts, heights=parts[0][:2], speeds=parts[1][:2], worn=parts[0][2:4]
+        phase, *parts, heights=parts[0][:2], speeds=parts[1][:2], cuffs=parts[0][2:6]
     )
     symbols = ca.vertcat(*goals.integrands(point_of_symbols, numbers, goals.goals))
     jacobian = np.asarray(ca.Function("j", [x], [ca.jacobian(symbols, x)])(point))

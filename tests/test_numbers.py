@@ -43,9 +43,9 @@ def walker() -> Walker:
 def test_every_number_has_one_address_and_one_name(walker: Walker) -> None:
     addresses = [number.address for number in walker.numbers]
     names = [number.full_name for number in walker.numbers]
-    assert len(set(addresses)) == len(set(names)) == len(addresses) == 14 + 2 * 9 + 4
-    for address in addresses:
-        assert walker.values[address] == walker.patient.number(address)
+    assert len(set(addresses)) == len(set(names)) == len(addresses) == 14 + 2 * 10 + 4
+    for number in walker.numbers:
+        assert walker.values[number.address] == number.value_for(walker.patient)
 
 
 def test_every_number_can_be_free_for_each_side_and_for_both(walker: Walker) -> None:

@@ -105,8 +105,10 @@ def test_what_contradicts_the_sides_is_refused(
 def test_every_number_may_differ_by_side(tmp_path: Path) -> None:
     shared = walker_of("orthosis")
     names = [n for n in shared.numbers if n.address.startswith("orthosis.") and n.side == "left"]
-    assert len(names) == 9 + 2
+    assert len(names) == 9 + 2 + 1
     content = load_patient(SHIPPED).model_dump(mode="json", exclude_none=True)
+    heights = {side: shared.patient.cuff_height(side) for side in ("right", "left")}
+    content["orthosis"]["cuff_height"] = heights
     for number in names:
         *parents, last = number.place.split(".")
         holder = content

@@ -264,8 +264,8 @@ def reference(series: GaitSeries) -> Reference:
     return Reference(angles={"hip_r": band, "lumbar_l": band}, forces={"foot_l_z": band})
 
 
-OF_THIS_WALK = [name for name in FIGURES if name != "toe_joints"]
-"""Figures of feet without toes; those of toes are in `test_toes`."""
+OF_THIS_WALK = [name for name in FIGURES if name not in ("toe_joints", "cuffs")]
+"""Figures of ten coordinates; those of toes and shells are in `test_toes` and `test_brace`."""
 
 
 @pytest.mark.parametrize("name", OF_THIS_WALK)

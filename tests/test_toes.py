@@ -16,14 +16,14 @@ from pathwalker_cli.conventions import SIDES, SUFFIX
 from pathwalker_cli.errors import ConfigError, PatientError
 from pathwalker_cli.export.osim import osim_text
 from pathwalker_cli.gait import mesh
+from pathwalker_cli.gait.further import with_further_joints
 from pathwalker_cli.gait.motion_file import read_motion, write_motion
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.gait.symmetry import asymmetries, full_stride
-from pathwalker_cli.gait.toes import with_toes
 from pathwalker_cli.gait.typical import typical_walks
 from pathwalker_cli.model.anthropometry import segments
 from pathwalker_cli.model.contact import TIPS, ContactPhase, Feet, contact_pattern
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, TOED_WALKER
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, walker_skeleton
 from pathwalker_cli.model.walker import Walker, build_walker
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.stride.balance import balance
@@ -35,7 +35,8 @@ from pathwalker_cli.stride.verify import second_engine_residual
 
 PATIENT = load_patient("sreenivasa2017-patient")
 FEET: tuple[Feet, ...] = ("points", "rockers", "sole", "compliant")
-N, ALL = PLANAR_WALKER.size, TOED_WALKER.size
+TOED = walker_skeleton(toes=True)
+N, ALL = PLANAR_WALKER.size, TOED.size
 ADULT = 75.0 * 1.75
 
 
@@ -46,17 +47,17 @@ def random_state(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def test_the_ten_coordinates_of_recordings_come_first() -> None:
-    assert TOED_WALKER.coordinates == (*PLANAR_WALKER.coordinates, "mtp_r", "mtp_l")
-    assert TOED_WALKER.named("velocity")[-1] == "mtp_l_velocity"
-    assert TOED_WALKER.completed(np.ones((3, N))).sum(axis=1) == pytest.approx(np.full(3, N))
-    assert tuple(build_walker(PATIENT, toes=True).model.names)[1:] == TOED_WALKER.coordinates
+    assert TOED.coordinates == (*PLANAR_WALKER.coordinates, "mtp_r", "mtp_l")
+    assert TOED.named("velocity")[-1] == "mtp_l_velocity"
+    assert TOED.completed(np.ones((3, N))).sum(axis=1) == pytest.approx(np.full(3, N))
+    assert tuple(build_walker(PATIENT, toes=True).model.names)[1:] == TOED.coordinates
 
 
 @pytest.mark.parametrize("side", SIDES)
 def test_foot_and_toes_weigh_what_the_foot_in_one_piece_does(side: str) -> None:
     s = SUFFIX[side]
     whole = {part.name: part for part in segments(PATIENT, "barefoot")}[f"foot_{s}"]
-    parts = {part.name: part for part in segments(PATIENT, "barefoot", skeleton=TOED_WALKER)}
+    parts = {part.name: part for part in segments(PATIENT, "barefoot", skeleton=TOED)}
     foot, toes = parts[f"foot_{s}"], parts[f"toes_{s}"]
     mass = foot.mass + toes.mass
     centre = np.array(toes.origin) + np.array(toes.com)
@@ -255,8 +256,8 @@ def test_a_foot_is_off_the_ground_when_its_toes_are() -> None:
 def test_a_walk_is_given_toes_that_lie_on_the_ground(tmp_path: Path) -> None:
     solver = toed_solver()
     walker = solver.walker
-    plain = typical_walks(walker.flat_footed)[0].scaled(walker, solver.parameter_guess())
-    motion = with_toes(walker, plain)
+    plain = typical_walks(walker.as_recorded)[0].scaled(walker, solver.parameter_guess())
+    motion = with_further_joints(walker, plain)
     deepest = 0.0
     for phase in motion.phases:
         for q in phase.states[:, :ALL]:

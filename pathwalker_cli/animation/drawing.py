@@ -175,7 +175,7 @@ def _leg(points: Mapping[str, np.ndarray], side: Side, with_orthosis: bool) -> t
         bones.append(Shape("foot", f"toe_{s}", f"tip_{s}", wedge, closed=True, side=side))
     shank, sole = _shells()
     orthosis = (
-        Shape("shell", f"knee_{s}", f"ankle_{s}", shank, closed=True, side=side),
+        Shape("shell", *_shank_of_shell(points, s), shank, closed=True, side=side),
         Shape("shell", f"heel_{s}", f"toe_{s}", sole, closed=True, side=side),
         Shape("spring", f"spring_top_{s}", f"spring_foot_{s}", _zigzag(), side=side),
     )
@@ -269,14 +269,20 @@ def _zigzag() -> np.ndarray:
     return np.concatenate([[[0.0, 0.0], [0.1, 0.0]], coils, [[0.9, 0.0], [1.0, 0.0]]])
 
 
+def _shank_of_shell(points: Mapping[str, np.ndarray], s: str) -> tuple[str, str]:
+    """Return the points that a shell hangs on: its own, or those of the shank that carries it."""
+    own = f"shell_knee_{s}" in points
+    return (f"shell_knee_{s}", f"shell_ankle_{s}") if own else (f"knee_{s}", f"ankle_{s}")
+
+
 def _spring_ends(points: Mapping[str, np.ndarray], sides: Sequence[Side]) -> dict[str, np.ndarray]:
     """Return where the springs hang on the shells, behind the ankles [m], shape (n, 2) each."""
     ends = {}
     top, foot = np.array([[_SHELL[1], -_SHELL[2]]]), np.array([[_SOLE[0], _SOLE[3]]])
-    places = (("top", top, "knee", "ankle"), ("foot", foot, "heel", "toe"))
     for s in (SUFFIX[side] for side in sides):
-        for name, corner, start, end in places:
-            pairs = zip(points[f"{start}_{s}"], points[f"{end}_{s}"], strict=True)
+        above = ("top", top, *_shank_of_shell(points, s))
+        for name, corner, start, end in (above, ("foot", foot, f"heel_{s}", f"toe_{s}")):
+            pairs = zip(points[start], points[end], strict=True)
             ends[f"spring_{name}_{s}"] = np.array([_placed(corner, a, b)[0] for a, b in pairs])
     return ends
 

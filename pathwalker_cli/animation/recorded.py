@@ -52,7 +52,7 @@ def recorded_frames(walker: Walker, trial: str, count: int) -> RecordedFrames:
     one, cycle, markers = cycles[0]
     share = np.arange(count) / count
     rows = cycle.start + (cycle.end - cycle.start) * share
-    points = body_points(walker.flat_footed, _at(one.motion.values, rows))
+    points = body_points(walker.as_recorded, _at(one.motion.values, rows))
     forward = one.motion.values[:, COORDINATES.index("pelvis_tx")]
     walked = share * (forward[cycle.end] - forward[cycle.start])
     eye = walked + float((points["hip_r"][:, 0] - walked).mean())

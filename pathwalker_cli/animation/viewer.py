@@ -42,9 +42,12 @@ def poses(series: GaitSeries, seconds: np.ndarray) -> np.ndarray:
 
 def walker_geometry(walker: Walker) -> pin.GeometryModel:
     """Return capsules and balls on the bodies of a walker; a worn orthosis is blue."""
-    geometry = pin.GeometryModel()
-    for name, joint, shape, placement, colour in _parts(walker):
-        made = pin.GeometryObject(name, walker.model.getJointId(joint), placement, shape)
+    geometry, data = pin.GeometryModel(), walker.model.createData()
+    pin.forwardKinematics(walker.model, data, np.zeros(walker.model.nq))
+    for name, joint, shape, upright, colour in _parts(walker):
+        number = walker.model.getJointId(joint)
+        placement = pin.SE3(data.oMi[number].rotation.T, np.zeros(3)) * upright
+        made = pin.GeometryObject(name, number, placement, shape)
         made.meshColor = colour
         geometry.addGeometryObject(made)
     return geometry
@@ -84,7 +87,7 @@ _Part = tuple[str, str, coal.CollisionGeometry, pin.SE3, np.ndarray]
 
 
 def _parts(walker: Walker) -> Iterator[_Part]:
-    """Yield name, joint, shape, place on the joint and colour of everything that is drawn."""
+    """Yield name, joint, shape, place from the joint, upright, and colour of all that is drawn."""
     points = body_points(walker, np.zeros(walker.skeleton.size))
     for side in SIDES:
         yield from _leg(points, side, side in walker.device.elements)
@@ -115,7 +118,10 @@ def _leg(points: dict[str, np.ndarray], side: Side, with_orthosis: bool) -> Iter
         ("instep", "ankle", np.zeros(3), toe, _FOOT, colour),
     ]
     if with_orthosis:
-        lines.append(("shell", "knee", 0.54 * ankle, 0.86 * ankle, _SHELL, _BLUE))
+        own = f"hinge_{s}" in points
+        top = _between(points, f"hinge_{s}", f"shell_knee_{s}") if own else np.zeros(3)
+        start, end = (top + share * ankle for share in (0.54, 0.86))
+        lines.append(("shell", "hinge" if own else "knee", start, end, _SHELL, _BLUE))
     if f"tip_{s}" in points:
         toes = _between(points, f"toe_{s}", f"tip_{s}")
         lines.append(("toes", "mtp", up, toes + up, _FOOT, colour))

@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from pathwalker_cli.conventions import COORDINATES, GRAVITY, SIDES, to_degrees
+from pathwalker_cli.conventions import COORDINATES, GRAVITY, SIDES, SUFFIX, to_degrees
 from pathwalker_cli.errors import ConfigError
 from pathwalker_cli.gait.bounds import Range, real_springs
 from pathwalker_cli.gait.solve import GaitSolver
@@ -222,7 +222,7 @@ def _loaded_stops(solver: GaitSolver) -> Iterator[str]:
     chosen = {address: ranges[u.name] for u in walker.unknowns for address in u.addresses}
     loaded = []
     for side, element in walker.device.elements.items():
-        (ankle,) = element.coordinates
+        ankle = f"ankle_{SUFFIX[side]}"
         if recorded is None or ankle not in recorded.joint_ranges:
             continue
         ends = zip(*(chosen.get(n.address, (walker.values[n.address],) * 2)

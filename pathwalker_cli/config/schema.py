@@ -35,7 +35,7 @@ from pathwalker_cli.model.contact import (
     Use,
     contact_pattern,
 )
-from pathwalker_cli.model.skeleton import TOED_WALKER
+from pathwalker_cli.model.skeleton import EVERY_JOINT, SIDES, Build, walker_skeleton
 from pathwalker_cli.patient.blocks import Stiffness
 from pathwalker_cli.patient.variation import Variation
 from pathwalker_cli.problems import PROBLEMS
@@ -69,7 +69,7 @@ Durations = Annotated[tuple[Seconds, Seconds], AS_TUPLE, ORDERED]
 StiffnessRange = Annotated[
     tuple[Stiffness, Stiffness], AS_TUPLE, BeforeValidator(_no_number), ORDERED
 ]
-Amount = Annotated[float, Quantity("SI units", -1000.0, 1000.0)]
+Amount = Annotated[float, Quantity("SI units", -1e8, 1e8)]
 AmountRange = Annotated[tuple[Amount, Amount], AS_TUPLE, BeforeValidator(_no_number), ORDERED]
 
 
@@ -89,7 +89,7 @@ def _keys_of(allowed: Collection[str], elsewhere: Collection[str] = ()) -> After
 
 
 RangeByAngle = Annotated[dict[str, Range], _keys_of(ANGLES)]
-RangeByJoint = Annotated[dict[str, Range], _keys_of(TOED_WALKER.angles)]
+RangeByJoint = Annotated[dict[str, Range], _keys_of(EVERY_JOINT.angles)]
 
 
 # names of trials that look like numbers are names
@@ -145,6 +145,7 @@ class ModelConfig(YamlModel):
     elements: Annotated[tuple[str, ...], AS_TUPLE] = ()
     feet: Feet = "points"
     toes: bool = False
+    orthosis: Build = "glued"
     contact: Sides[FootUse] = Sides[FootUse](right=HEEL_TOE[0], left=HEEL_TOE[1])
 
     @property
@@ -376,21 +377,21 @@ class StudyConfig(YamlModel):
                 "weighs the goal 'centre_of_pressure', which needs heel and toe: a sole rolls",
                 mend="leave the goal out, or set model.feet to points or rockers",
             )
-        if not self.model.toes and (toes := self.bounds.joint_ranges.keys() - set(ANGLES)):
-            raise invalid(
-                f"bounds {min(toes)} of toes that no joint carries",
-                mend="set model.toes to true, or leave it out of bounds.joint_ranges",
-            )
         if self.model.toes and self.condition == "orthosis":
             raise invalid(
                 "gives toes to feet with orthoses, whose soles are one plate",
                 mend="set model.toes to false, or solve a barefoot problem",
             )
-        if self.model.toes and self.transcription != "collocation":
-            raise invalid(
-                f"asks for {self.transcription} of feet with toes, too quick for its steps",
-                mend="set transcription to collocation, or model.toes to false",
-            )
+        quick = {"toes": self.model.toes, "orthosis": self.shelled}
+        for key, name, off in (
+            ("toes", "feet with toes", "false"),
+            ("orthosis", "an orthosis that is a body of its own", "glued"),
+        ):
+            if quick[key] and self.transcription != "collocation":
+                raise invalid(
+                    f"asks for {self.transcription} of {name}, too quick for its steps",
+                    mend=f"set transcription to collocation, or model.{key} to {off}",
+                )
         if self.model.feet == "compliant":
             if self.fits:
                 raise invalid(
@@ -402,6 +403,21 @@ class StudyConfig(YamlModel):
                     f"asks for {self.transcription} of feet that give way, too quick for its steps",
                     mend="set transcription to collocation, or model.feet to sole",
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _bounds_of_joints(self) -> StudyConfig:
+        skeleton = walker_skeleton(self.model.toes, SIDES if self.shelled else ())
+        for name in sorted(self.bounds.joint_ranges.keys() - set(skeleton.angles)):
+            missing, mend = (
+                ("toes that no joint carries", "model.toes to true")
+                if name.startswith("mtp")
+                else ("an orthosis that is no body of its own", "model.orthosis to body")
+            )
+            raise invalid(
+                f"bounds {name} of {missing}",
+                mend=f"set {mend}, or leave it out of bounds.joint_ranges",
+            )
         return self
 
     @model_validator(mode="after")
@@ -439,6 +455,11 @@ class StudyConfig(YamlModel):
     def condition(self) -> Condition:
         """Condition that the problem is about."""
         return PROBLEMS[self.problem].condition
+
+    @property
+    def shelled(self) -> bool:
+        """Whether orthoses are worn that are bodies of their own."""
+        return self.model.orthosis == "body" and self.condition == "orthosis"
 
     @property
     def fits(self) -> bool:

@@ -111,7 +111,7 @@ def recorded_gait(walker: Walker) -> RecordedGait | None:
         study="inverse-dynamics", patient=patient.id, conditions=(condition,)
     )
     trials = recorded_trials(config, patient, condition, lambda _: None)
-    return RecordedGait(walker.flat_footed, tuple(trials))
+    return RecordedGait(walker.as_recorded, tuple(trials))
 
 
 def recorded_numbers(

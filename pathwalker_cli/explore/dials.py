@@ -27,7 +27,7 @@ _FASTEST: Final = 1.5
 
 _ORTHOSIS: Final = {
     "neutral_angle": 0.1, "dorsiflexion_stop": 0.1, "plantarflexion_stop": 0.1,
-    "free_play": 0.02, "preload_torque": 3.0,
+    "free_play": 0.02, "preload_torque": 3.0, "hinge_forward": 0.02, "hinge_up": 0.02,
 }  # fmt: skip
 """How far numbers of the device are turned from where they are [their unit]."""
 

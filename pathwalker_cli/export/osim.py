@@ -12,12 +12,13 @@ from typing import Final
 import numpy as np
 
 from pathwalker_cli.conventions import GRAVITY, ROOT, SUFFIX
+from pathwalker_cli.errors import InputError
 from pathwalker_cli.export.xml import Node, collection, document, node, numbers, place
 from pathwalker_cli.model.anthropometry import Segment, Vector, segments
 from pathwalker_cli.model.contact import ContactPoint
 from pathwalker_cli.model.elements.curves import evaluate, samples
 from pathwalker_cli.model.elements.orthosis import AnkleOrthosis, orthosis_curve
-from pathwalker_cli.model.skeleton import TOED_WALKER, Joint
+from pathwalker_cli.model.skeleton import EVERY_JOINT, Joint
 from pathwalker_cli.model.urdf import point_place
 from pathwalker_cli.model.walker import Walker
 
@@ -49,7 +50,16 @@ def osim_text(walker: Walker) -> str:
     sign [N m], tissue of the joints one of 1 N m per coordinate; an orthosis is a rotational
     bushing between shank and foot; heels and toes are markers, as joints are, and spheres where
     feet roll.
+
+    Raises:
+        InputError: If an orthosis is a body of its own.
     """
+    if walker.shelled:
+        raise InputError(
+            "an orthosis that is a body of its own cannot be written for OpenSim, whose bushings "
+            "turn with both bodies",
+            allowed="runs with model.orthosis glued, or an export without --opensim",
+        )
     parts = segments(
         walker.patient, walker.condition, walker.published, walker.values, walker.skeleton
     )
@@ -121,7 +131,7 @@ def _joint(part: Segment) -> Node:
     if part.parent and not part.joint:
         return node("WeldJoint", node("frames", frame), name=f"{part.name}_weld", **ends)
     names = (part.joint,) if part.parent else ROOT
-    joints = [joint for joint in TOED_WALKER.joints if joint.coordinate in names]
+    joints = [joint for joint in EVERY_JOINT.joints if joint.coordinate in names]
     return node(
         "CustomJoint",
         node("frames", frame),

@@ -182,8 +182,7 @@ def _joint_ranges(walker: Walker, config: BoundsConfig, sources: dict[str, str])
             low, high = low - margin, high + margin
             source = f"barefoot recordings widened by {margin:g} rad"
         elif name not in PLANAR_WALKER.angles:
-            low, high = choices.TOE_ANGLES
-            source = "what toes can do"
+            low, high, source = choices.FURTHER_ANGLES[name.rpartition("_")[0]]
         elif name in config.fallback_joint_ranges:
             low, high = config.fallback_joint_ranges[name]
             source = "fallback: the patient's file has no recorded ones"
@@ -274,12 +273,20 @@ def real_springs(patient: Patient, unknown: Unknown) -> Range:
 
 
 def require_worn(walker: Walker, config: StudyConfig) -> None:
-    """Refuse a config that names springs of a side that wears no orthosis, beside one that does.
+    """Refuse a config that names springs or the hinge of a side that wears no orthosis.
 
     Raises:
         ConfigError: If so.
     """
     worn = tuple(walker.device.elements)
+    for name in sorted(config.bounds.joint_ranges):
+        if name not in walker.skeleton.angles:
+            raise ConfigError(
+                f"bounds {name} of a side on which {walker.patient.id} wears no orthosis",
+                where="bounds.joint_ranges",
+                allowed=", ".join(walker.skeleton.angles),
+                mend="leave it out, or correct orthosis.sides of the patient",
+            )
     for where, named in (("bounds", config.bounds.stiffness), ("start", config.start.stiffness)):
         for name in named:
             side = name.rpartition("_")[2]

@@ -60,8 +60,12 @@ TRACKING_BARRIER_FACTOR: Final = 100.0
 fewest iterations."""
 TRACKING_ANGLES: Final = (-2.5, 2.5)
 """Range of the joint angles there [rad]: a recording may lie outside the prediction's ranges."""
-TOE_ANGLES: Final = (-1.2, 0.6)
-"""Range of the toe joints [rad]: a big toe extends by some 70 and flexes by some 35 degrees."""
+FURTHER_ANGLES: Final = {
+    "mtp": (-1.2, 0.6, "what toes can do"),
+    "hinge": (-1.2, 1.2, "further than any stop lets a hinge turn"),
+}
+"""Ranges of joints that no recording knows [rad], and why: a big toe extends by some 70 and flexes
+by some 35 degrees; stops of orthoses are steep."""
 FADED: Final = 0.02
 """Share of the orthosis that acts in the first stage, whose stride knows nothing of it."""
 HELPED: Final = {"effort": 1e-2, "rate": 2e-4, "acceleration": 1e-5, "reserve": 10.0}

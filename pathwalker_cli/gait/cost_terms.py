@@ -99,8 +99,9 @@ def _goal_gains(phase: PhaseMotion, costs: Costs, walker: Walker) -> np.ndarray:
     position, velocity = (np.asarray(values).T.reshape(*shape, -1) for values in places)
     heights, speeds = position[..., 1::2][..., air], velocity[..., ::2][..., air]
     elements = walker.element_forces(*(x.reshape(-1, x.shape[-1]) for x in (q, v, activation)))
-    worn = walker.device_torques(elements).reshape(*shape, -1)
-    columns = q, v, activation, force, rate, excitation, vdot, reserve, q, heights, speeds, worn
+    loads = walker.cuff_forces(q.reshape(-1, n), v.reshape(-1, n), elements)
+    cuffs = loads.reshape(*shape, -1)
+    columns = q, v, activation, force, rate, excitation, vdot, reserve, q, heights, speeds, cuffs
     moved = (list(np.moveaxis(values, -1, 0)) for values in columns)
     point = Instant(contact, *moved, coordinates=walker.skeleton.coordinates)
     running = costs.integrands(point, list(costs.numbers(walker)), costs.goals)

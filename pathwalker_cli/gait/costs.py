@@ -17,13 +17,16 @@ from pathwalker_cli.conventions import ANGLES, CONTACT_POINTS, COORDINATES, LEG_
 from pathwalker_cli.gait import choices
 from pathwalker_cli.io.c3d_plates import LOADED
 from pathwalker_cli.model.contact import ContactPhase
-from pathwalker_cli.model.skeleton import SIDES
+from pathwalker_cli.model.skeleton import EVERY_JOINT, SIDES
 
 if TYPE_CHECKING:
     from pathwalker_cli.model.walker import Walker
 
 Weights = Mapping[str, float]
 """Weight of every term by its name; what is missing counts nothing."""
+
+
+_BESIDE: Final = frozenset(joint.coordinate for joint in EVERY_JOINT.joints if joint.beside)
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,8 @@ class Instant:
         reference: Coordinates that are followed, 10 entries [m, rad].
         heights: Heights of the places in the air, in the order of the walker's pattern [m].
         speeds: Their forward velocities [m/s].
-        worn: Torques of the orthoses right, left [N m]; 0 where none is worn.
+        cuffs: Forces of the orthoses' cuffs on the legs: right across, right along the shank, left
+            across, left along [N]; 0 where none is worn.
         coordinates: Names of the coordinates.
         power: Power of the activations in the effort.
         data: Numbers of the term, see `CostTerm.size`.
@@ -61,7 +65,7 @@ class Instant:
     reference: Sequence[Any] = ()
     heights: Sequence[Any] = ()
     speeds: Sequence[Any] = ()
-    worn: Sequence[Any] = ()
+    cuffs: Sequence[Any] = ()
     coordinates: Sequence[str] = field(default=COORDINATES, kw_only=True)
     power: int = field(default=2, kw_only=True)
     data: Sequence[Any] = ()
@@ -86,6 +90,12 @@ class Instant:
         """Vertical force by contact point, 0 for points in the air [N]."""
         loads = {f.point.name: self.force[i] for i, f in enumerate(self.phase.forces) if f.bears}
         return {point: loads.get(point, 0.0) for point in CONTACT_POINTS}
+
+    @property
+    def own_vdot(self) -> tuple[Any, ...]:
+        """Accelerations but for those of what turns beside a joint of the body."""
+        pairs = zip(self.coordinates, self.vdot, strict=False)
+        return tuple(value for name, value in pairs if name not in _BESIDE)
 
     def angle(self, name: str) -> Any:
         """Return a coordinate by its name."""
@@ -177,8 +187,8 @@ BASE: Final[dict[str, CostTerm]] = {
     ),
     "acceleration": CostTerm(
         "calm limbs: squared accelerations per distance (regularisation)",
-        ("acceleration",), _squares("vdot", choices.ACCELERATION_SIZE), _of("acceleration"), "s/m",
-        per_distance=True, result="acceleration_regularisation",
+        ("acceleration",), _squares("own_vdot", choices.ACCELERATION_SIZE), _of("acceleration"),
+        "s/m", per_distance=True, result="acceleration_regularisation",
     ),
     "tracking": CostTerm(
         "follow a stride: integral of (q - q_ref)^2",
@@ -295,9 +305,8 @@ def _stumbling(point: Instant) -> tuple[Any, ...]:
 
 
 def _cuff_load(point: Instant) -> tuple[Any, ...]:
-    weight, *heights = point.data
-    forces = (torque / (h * weight) for torque, h in zip(point.worn, heights, strict=True))
-    return (sum((force**2 for force in forces), 0.0 * point.q[0]),)
+    (weight,) = point.data
+    return (sum(((force / weight) ** 2 for force in point.cuffs), 0.0 * point.q[0]),)
 
 
 def _mean(name: str) -> Callable[[Totals], Any]:
@@ -333,7 +342,7 @@ GOALS: Final[dict[str, CostTerm]] = {
     "cuff_load": CostTerm(
         "spare the leg under the cuff: squared forces of the orthoses' cuffs in body weights, per "
         "distance",
-        ("cuff_load",), _cuff_load, _of("cuff_load"), "s/m", size=3, per_distance=True,
+        ("cuff_load",), _cuff_load, _of("cuff_load"), "s/m", size=1, per_distance=True,
     ),
     "crouch": CostTerm(
         "stand straighter: mean square of the knee flexion of stance",
@@ -423,7 +432,7 @@ class Costs:
         known = {
             "upright_trunk": [self.trunk_lean],
             "centre_of_pressure": [walker.weight],
-            "cuff_load": [walker.weight, *(walker.patient.cuff_height(side) for side in SIDES)],
+            "cuff_load": [walker.weight],
             "discomfort": np.array(ranges).T.ravel(),
         }
         return np.concatenate([np.zeros(0), *(known[n] for n in self.names if n in known)])

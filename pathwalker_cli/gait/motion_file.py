@@ -17,7 +17,7 @@ from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait.costs import Costs
 from pathwalker_cli.io.atomic import refuse_special
 from pathwalker_cli.model.contact import PHASE_NAMES, phase_named
-from pathwalker_cli.model.skeleton import TOED_WALKER
+from pathwalker_cli.model.skeleton import EVERY_JOINT
 from pathwalker_cli.nlp.result import Multipliers
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
@@ -157,9 +157,10 @@ def _check(motion: PhasedMotion, path: str | Path) -> None:
 def _shapes(phase: PhaseMotion) -> dict[str, tuple[int, ...]]:
     """Return the shapes that belong to the mesh and the degree of a phase."""
     contact, nodes = phase_named(phase.name), max(2, phase.mesh.size)
-    n = len(COORDINATES)
-    if phase.states.shape[-1:] == (2 * TOED_WALKER.size,):
-        n, contact = TOED_WALKER.size, contact.with_toes
+    n = phase.states.shape[-1] // 2 if phase.states.ndim else 0
+    n = n if len(COORDINATES) < n <= EVERY_JOINT.size else len(COORDINATES)
+    if phase.algebraic.shape[-1:] == (2 * n + len(contact.with_toes.forces),):
+        contact = contact.with_toes
     inner = phase.inner_states.shape
     degree = inner[1] if len(inner) == 3 else 1
     width = phase.integrals.shape[-1] if phase.integrals.ndim else 0

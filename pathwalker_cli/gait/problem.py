@@ -285,15 +285,24 @@ class GaitProblem:
         columns = (self.q, self.v, a, force, rate, excitation_from_rate(rate, a), vdot, reserve)
         air = self.pattern.in_the_air(contact)
         heights, speeds = position[[2 * i + 1 for i in air]], velocity[[2 * i for i in air]]
-        worn = ca.SX.zeros(len(SIDES))
-        for side, element in self.walker.device.elements.items():
-            (column,) = self.walker.columns([element])
-            worn[SIDES.index(side)] = self._torques[0][column]
-        known = *columns, self.reference, heights, speeds, worn
+        known = *columns, self.reference, heights, speeds, self._cuffs()
         split = (ca.vertsplit(x) if x.numel() else [] for x in known)
         point = Instant(contact, *split, coordinates=self.walker.skeleton.coordinates)
         numbers = ca.vertsplit(self.constants.cost_numbers)
         return ca.vertcat(*self.costs.integrands(point, numbers))
+
+    def _cuffs(self) -> ca.SX:
+        """Return the forces of the cuffs on the legs, see `Instant.cuffs` [N]."""
+        walker, loads = self.walker, ca.SX.zeros(2 * len(SIDES))
+        numbers = {**self.constants.numbers, **self._free}
+        state = walker.state(*map(ca.vertsplit, (self.q, self.v, self.activations.symbol)))
+        torques = {
+            side: self._torques[0][walker.columns([element])[0]]
+            for side, element in walker.device.elements.items()
+        }
+        for side, load in walker.device.cuff_forces(state, numbers, torques).items():
+            loads[2 * SIDES.index(side) : 2 * SIDES.index(side) + 2] = ca.vertcat(*load)
+        return loads
 
     def _sample(self) -> ca.SX:
         """Return the cost of one recorded instant of a passage."""

@@ -79,7 +79,7 @@ def recorded_stride(walker: Walker, recording: CompactRecording) -> ReferenceStr
     pairs = zip(gaps, choices.PHASE_SPLITS, strict=True)
     durations = np.array([part for gap, s in pairs for part in (gap * s, gap - gap * s)])
     closed[:, _TX] -= closed[0, _TX]
-    closed[:, _TZ] -= walker.flat_footed.foot_points(closed)[..., 1].min(axis=-1).mean()
+    closed[:, _TZ] -= walker.as_recorded.foot_points(closed)[..., 1].min(axis=-1).mean()
     grid = np.linspace(0.0, period, len(closed))
     phases, name = walker.pattern.durations(durations), f"recording {recording.name}"
     return ReferenceStride(name, _of_all_joints(walker, grid, closed), phases)
@@ -96,7 +96,7 @@ def recorded_passage(walker: Walker, recording: CompactRecording) -> ReferenceSt
         DataError: If the recording holds no such stride.
     """
     motion = recording.motion
-    heights = walker.flat_footed.foot_points(motion.values)[..., 1]
+    heights = walker.as_recorded.foot_points(motion.values)[..., 1]
     cuts = _phase_frames(_passage_frames(recording), heights, recording.name)
     part = slice(cuts[0], cuts[-1] + 1)
     values = motion.values[part].copy()

@@ -179,7 +179,7 @@ class GaitSolution:
 
         Args:
             figure: "joint_angles", "joint_moments", "ground_forces", "activations",
-                "stick_figures", "ankle_torque", "orthosis_curves" or "toe_joints".
+                "stick_figures", "ankle_torque", "orthosis_curves", "toe_joints" or "cuffs".
 
         Raises:
             NotConvergedError: If it did not converge.

@@ -25,6 +25,7 @@ from pathwalker_cli.gait.bounds import (
 )
 from pathwalker_cli.gait.cost_terms import cost_terms, with_goal_costs
 from pathwalker_cli.gait.costs import Weights
+from pathwalker_cli.gait.further import with_further_joints
 from pathwalker_cli.gait.problem import Form, GaitProblem, gait_blocks
 from pathwalker_cli.gait.recorded import (
     passage_samples,
@@ -43,7 +44,6 @@ from pathwalker_cli.gait.solution import (
 from pathwalker_cli.gait.start import ReferenceStride
 from pathwalker_cli.gait.stylised import stylised_stride
 from pathwalker_cli.gait.symmetry import full_stride, require_symmetry
-from pathwalker_cli.gait.toes import with_toes
 from pathwalker_cli.gait.typical import TypicalWalk, typical_walks
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.nlp.ipopt import IpoptSettings, solve_program
@@ -224,26 +224,34 @@ class GaitSolver:
         return self._finish(program, result, errors, start)
 
     def _from_the_start(self, tolerance: float) -> tuple[str, Stage]:
-        """Predict on the first mesh as the config's start says; with toes, from a walk without.
+        """Predict on the first mesh as the config's start says.
+
+        With joints that recordings do not know, it is a walk without them that leads there.
 
         Raises:
             KeyboardInterrupt: If the user stops it: there is no iterate of this problem yet.
         """
-        if not self.walker.parts.toes:
+        if self.walker.as_recorded is self.walker:
             return self._from_typical_walk(tolerance) or self._from_stride(tolerance)
-        known = self.walker.flat_footed.parts.numbers
+        known = self.walker.as_recorded.parts.numbers
         names = {name for number in known for name in (number.address, number.place)}
         free = {address: pair for address, pair in self.config.free.items() if address in names}
         given = self.config.bounds.joint_ranges.items()
         ranges = {name: pair for name, pair in given if name in COORDINATES}
-        values = {"model.toes": False, "free": free, "bounds.joint_ranges": ranges}
+        values = {
+            "model.toes": False,
+            "model.orthosis": "glued",
+            "free": free,
+            "bounds.joint_ranges": ranges,
+        }
         case = self.case.with_values(values)
-        flat = GaitSolver(case, self.observer, self.stages, self.seconds)
-        start, (program, result) = flat._from_the_start(tolerance)
+        plain = GaitSolver(case, self.observer, self.stages, self.seconds)
+        start, (program, result) = plain._from_the_start(tolerance)
         if self._interrupted:
             raise KeyboardInterrupt
         found = program.to_motion(result.unknowns)
-        motion = replace(with_toes(self.walker, found), parameters=self.parameter_guess())
+        motion = with_further_joints(self.walker, found)
+        motion = replace(motion, parameters=self.parameter_guess())
         return start, self._on_first_mesh(motion, self.settings(tolerance, choices.TYPICAL_BARRIER))
 
     def _from_typical_walk(self, tolerance: float) -> tuple[str, Stage] | None:

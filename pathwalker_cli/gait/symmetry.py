@@ -13,6 +13,7 @@ from pathwalker_cli.gait.cost_terms import walked_distance
 from pathwalker_cli.gait.problem import algebraic_names
 from pathwalker_cli.model.contact import mirrored_phase
 from pathwalker_cli.model.parts import Parts
+from pathwalker_cli.model.skeleton import Side
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion
 
@@ -31,9 +32,17 @@ def asymmetries(walker: Walker) -> list[str]:
         "contact points": np.allclose(right, left) and round_alike,
         "contacts": len(set(walker.parts.contact)) == 1,
         "masses or lengths": np.allclose(bias, swapped[order], rtol=1e-9, atol=1e-9),
-        "orthoses": walker.orthosis.get("right") == walker.orthosis.get("left"),
+        "orthoses": _worn(walker, "right") == _worn(walker, "left"),
     }
     return [name for name, same in alike.items() if not same]
+
+
+def _worn(walker: Walker, side: Side) -> dict[str, float]:
+    """Return the numbers of the orthosis of a side by name, springs left out."""
+    device = walker.device
+    parts = [part[side] for part in (device.elements, device.cuffs) if side in part]
+    numbers = (n for part in parts for n in part.numbers if n.name not in device.identified)
+    return {number.name: walker.values[number.address] for number in numbers}
 
 
 def require_symmetry(walker: Walker) -> None:

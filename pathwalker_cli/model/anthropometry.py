@@ -15,7 +15,7 @@ from pathwalker_cli.conventions import SIDES, SUFFIX, Condition
 from pathwalker_cli.errors import PatientError
 from pathwalker_cli.model.choices import TOES_MASS_SHARE
 from pathwalker_cli.model.devices import device_on
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, TOED_WALKER, Skeleton
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, Skeleton
 
 if TYPE_CHECKING:
     from pathwalker_cli.patient import Patient
@@ -129,23 +129,31 @@ def segments(
 
     Args:
         patient: The patient.
-        condition: "barefoot", or "orthosis" with its mass added to shank and foot.
+        condition: "barefoot", or "orthosis" with its mass added to foot and shank or shell.
         published: Hang the right lower arm and hand where the published model has them: at the
             length of the segment itself below its parent's origin instead of at the parent's.
-        values: Masses of the device by address [kg], if not those of the patient's file.
+        values: Masses of the device [kg] and places of its hinges [m] by address, if not those of
+            the patient's file.
         skeleton: Which joints there are.
+
+    Raises:
+        PatientError: If a foot has no room for a toe joint, or a shell has no mass.
     """
-    mass = (values or {}).get
-    added = {
-        link: mass(number.address, patient.number(number.address))
-        for link, number in device_on(patient.braced(condition)).added_mass.items()
-    }
-    legs = [part for side in SIDES for part in _leg(patient, side, added)]
-    if skeleton is TOED_WALKER:
-        soles = patient.contacts(condition)
-        for side in SIDES:
-            at = next(i for i, part in enumerate(legs) if part.name == f"foot_{SUFFIX[side]}")
-            legs[at : at + 1] = _split(legs[at], soles[side].toe, patient.toes_length(side))
+    given, braced = values or {}, patient.braced(condition)
+    device = device_on(braced, "body" if "shell" in _kinds(skeleton) else "glued")
+    number = {n: given.get(n.address, n.value_for(patient)) for n in device.body_numbers}
+    added = {link: number[mass] for link, mass in device.added_mass.items()}
+    legs: list[Segment] = []
+    for side in SIDES:
+        thigh, shank, foot = _leg(patient, side, added)
+        feet = [foot]
+        if "toes" in _kinds(skeleton):
+            ball = patient.contacts(condition)[side].toe
+            feet = list(_split(foot, ball, patient.toes_length(side)))
+        legs += [thigh, shank, *feet]
+        if f"shell_{SUFFIX[side]}" in skeleton.links:
+            forward, up = (number[place] for place in device.cuffs[side].hinge)
+            legs.append(_shell(shank, foot, added[f"shell_{SUFFIX[side]}"], (forward, up)))
     return (
         _segment(patient, "pelvis", "", 0.0),
         *legs,
@@ -155,7 +163,9 @@ def segments(
     )
 
 
-def _leg(patient: Patient, side: str, added: Mapping[str, float]) -> tuple[Segment, ...]:
+def _leg(
+    patient: Patient, side: str, added: Mapping[str, float]
+) -> tuple[Segment, Segment, Segment]:
     """Return thigh, shank and foot of a side; a device adds mass, and inertia in proportion."""
     suffix = SUFFIX[side]
     chain = (
@@ -163,7 +173,7 @@ def _leg(patient: Patient, side: str, added: Mapping[str, float]) -> tuple[Segme
         ("shank", f"thigh_{suffix}", "knee", patient.length("thigh", side)),
         ("foot", f"shank_{suffix}", "ankle", patient.length("shank", side)),
     )
-    return tuple(
+    thigh, shank, foot = (
         _segment(
             patient,
             name,
@@ -174,6 +184,45 @@ def _leg(patient: Patient, side: str, added: Mapping[str, float]) -> tuple[Segme
             added.get(f"{name}_{suffix}", 0.0),
         )
         for name, parent, joint, drop in chain
+    )
+    return thigh, shank, foot
+
+
+def _kinds(skeleton: Skeleton) -> set[str]:
+    """Return the names of its links without sides."""
+    return {link.rpartition("_")[0] for link in skeleton.links}
+
+
+def _shell(shank: Segment, foot: Segment, mass: float, hinge: tuple[float, float]) -> Segment:
+    """Return the shell of an orthosis, which turns on the foot about its hinge.
+
+    Its mass is spread like the shank's own, as is that of an orthosis that is glued to it.
+
+    Args:
+        shank: The shank alone.
+        foot: The foot.
+        mass: Of the shell [kg].
+        hinge: Where it is: in front of the ankle, above it [m].
+
+    Raises:
+        PatientError: If it has no mass.
+    """
+    if mass <= 0.0:
+        raise PatientError(
+            "is 0, and a shell without mass cannot be a body of its own",
+            where="orthosis.mass.shank",
+            mend="weigh the shell, or set model.orthosis to glued",
+        )
+    (x, z), share = hinge, mass / shank.mass
+    return Segment(
+        name=shank.name.replace("shank", "shell"),
+        parent=foot.name,
+        joint=foot.joint.replace("ankle", "hinge"),
+        origin=(x, 0.0, z),
+        length=shank.length,
+        mass=mass,
+        com=(-x, 0.0, shank.com[2] - foot.origin[2] - z),
+        inertia=(share * shank.inertia[0], share * shank.inertia[1], share * shank.inertia[2]),
     )
 
 

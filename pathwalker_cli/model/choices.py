@@ -6,6 +6,7 @@ from typing import Final
 
 UNIT_SIZES: Final = {
     "N m/rad": 50.0, "N m": 10.0, "rad": 0.1, "deg": 10.0, "kg": 1.0, "m": 0.1, "N m s/rad": 0.1,
+    "N/m": 1e4, "N s/m": 100.0,
 }  # fmt: skip
 """What counts as 1 for the solver, by unit; for stiffnesses prototypes needed the fewest
 iterations with this, the others are of the size of the numbers themselves."""
@@ -21,6 +22,19 @@ STEEP: Final = 0.5
 """Stiffness, as a share of 2 tau_0/theta_W, up to which the preload rises with 4 tau_0/theta_W."""
 NO_PRELOAD: Final = 1e-12
 """Keeps the ratio of an orthosis without preload finite [N m]."""
+
+# The cuff of an orthosis.
+CUFF_MODULUS: Final = 60e3
+"""Elastic modulus of a leg under a cuff [Pa]: of lower limbs Zheng and Mak (1999) found up to
+58 kPa at the beginning of an indentation, rising by 22 to 547 kPa times the strain."""
+CUFF_TISSUE: Final = 0.06
+"""Thickness of what a cuff presses together, as a share of the shank: 17 mm of a seven-year-old;
+assumed."""
+CUFF_SHEAR: Final = 1.0 / 3.0
+"""Stiffness of a cuff along the shank beside that across: shear of what keeps its volume."""
+CUFF_RELAXATION: Final = 0.01
+"""Damping of a cuff beside its stiffness [s]: a shell of some hundred grams just does not swing on
+the leg; assumed."""
 
 # Feet.
 ROCKER_SHARES: Final = {"heel": 0.18, "toe": 0.18, "tip": 0.05}

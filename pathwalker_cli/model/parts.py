@@ -25,7 +25,7 @@ from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator, generato
 from pathwalker_cli.model.elements.tissue import leg_tissue
 from pathwalker_cli.model.elements.toes import toe_joints
 from pathwalker_cli.model.numbers import Number, Unknown, unknowns_at
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, TOED_WALKER, Side, Skeleton
+from pathwalker_cli.model.skeleton import Build, Side, Skeleton, walker_skeleton
 
 _MUSCLES: Final = generators()
 _TISSUE: Final = leg_tissue()
@@ -44,6 +44,7 @@ class Parts:
         further: Names of force elements that were registered, see `extensions`.
         braced: Sides that wear an orthosis.
         toes: Whether a joint carries the toes.
+        orthosis: Whether an orthosis is glued to shank and foot, or a body of its own.
     """
 
     condition: Condition = "barefoot"
@@ -53,11 +54,17 @@ class Parts:
     further: tuple[str, ...] = ()
     braced: tuple[Side, ...] = ()
     toes: bool = False
+    orthosis: Build = "glued"
 
     @property
     def skeleton(self) -> Skeleton:
         """Bodies and joints."""
-        return TOED_WALKER if self.toes else PLANAR_WALKER
+        return walker_skeleton(self.toes, self.shelled)
+
+    @property
+    def shelled(self) -> tuple[Side, ...]:
+        """Sides whose orthosis is a body of its own."""
+        return self.braced if self.orthosis == "body" else ()
 
     @property
     def pattern(self) -> ContactPattern:
@@ -77,7 +84,7 @@ class Parts:
     @property
     def device(self) -> Device:
         """What the patient walks with."""
-        return device_on(self.braced)
+        return device_on(self.braced, self.orthosis)
 
     @property
     def muscles(self) -> tuple[MuscleTorqueGenerator, ...]:
@@ -115,14 +122,19 @@ class Parts:
     @cached_property
     def body_numbers(self) -> tuple[Number, ...]:
         """The numbers that enter the rigid bodies and their contacts, all of them linearly."""
-        return (*self.device.added_mass.values(), *self.shapes)
+        return (*self.device.body_numbers, *self.shapes)
+
+    @property
+    def moved_joints(self) -> tuple[str, ...]:
+        """Coordinates of the joints whose place is a number that may move."""
+        return tuple(joint.coordinate for joint in self.skeleton.joints if joint.beside)
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
         """Every named number: of the elements, of the bodies, of what gives way."""
         of_elements = (n for element in self.elements for n in element.numbers)
         laws = (number for place in self.pattern.yielding for number in place.law)
-        return (*of_elements, *self.body_numbers, *laws)
+        return tuple(dict.fromkeys((*of_elements, *self.body_numbers, *laws)))
 
     def unknowns(self, free: Sequence[str] = ()) -> tuple[Unknown, ...]:
         """Return what a problem chooses: what is asked for, and what a device is identified by.

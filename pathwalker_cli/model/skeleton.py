@@ -2,14 +2,14 @@
 
 World frame: x forward, z up, rotations about +y (right-hand rule), SI units and radians.
 Positive: pelvis_tilt and lumbar = forward lean, hip = extension, knee = flexion,
-ankle = plantarflexion, mtp (toes) = flexion, so that it is negative when the heel rises.  The zero
-pose is upright with straight legs and feet at 90 degrees.
+ankle and hinge (of an orthosis) = plantarflexion, mtp (toes) = flexion, so that it is negative when
+the heel rises.  The zero pose is upright with straight legs and feet at 90 degrees.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Final, Literal
 
 import numpy as np
@@ -18,6 +18,9 @@ Side = Literal["right", "left"]
 SIDES: Final[tuple[Side, Side]] = ("right", "left")
 SUFFIX: Final[dict[str, str]] = {"right": "r", "left": "l"}
 """Suffix of a side in coordinate and link names."""
+
+Build = Literal["glued", "body"]
+"""An orthosis that is glued to shank and foot, or a shell that turns about a hinge on the foot."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +35,17 @@ class Joint:
         slides: Whether it is a slider [m], not a hinge [rad].
         side: The side that it belongs to; None on the midline.
         root: Whether it hangs the pelvis on the world: nothing drives it.
+        beside: Coordinate of the joint of the body that it turns with, from outside.
     """
 
     coordinate: str
     parent: str
     child: str
-    axis: Literal["x", "y", "z"] = "y"
+    axis: Literal["x", "y", "z", "-y"] = "y"
     slides: bool = False
     side: Side | None = None
     root: bool = False
+    beside: str = ""
 
 
 @dataclass(frozen=True)
@@ -68,6 +73,11 @@ class Skeleton:
     def root(self) -> tuple[str, ...]:
         """Coordinates that no actuator drives: where and how the pelvis is."""
         return tuple(joint.coordinate for joint in self.joints if joint.root)
+
+    @cached_property
+    def links(self) -> frozenset[str]:
+        """Names of the links that joints move."""
+        return frozenset(joint.child for joint in self.joints)
 
     @property
     def size(self) -> int:
@@ -109,11 +119,35 @@ PLANAR_WALKER: Final = Skeleton(
 )
 """The sagittal walker of Sreenivasa et al. (2017): two translations, eight angles."""
 
-TOED_WALKER: Final = Skeleton(
-    (
-        *PLANAR_WALKER.joints,
-        Joint("mtp_r", "foot_r", "toes_r", side="right"),
-        Joint("mtp_l", "foot_l", "toes_l", side="left"),
-    )
+_TOES: Final = tuple(
+    Joint(f"mtp_{SUFFIX[side]}", f"foot_{SUFFIX[side]}", f"toes_{SUFFIX[side]}", side=side)
+    for side in SIDES
 )
-"""The same with a metatarsophalangeal joint in each foot."""
+_HINGES: Final = {
+    side: Joint(
+        f"hinge_{SUFFIX[side]}",
+        f"foot_{SUFFIX[side]}",
+        f"shell_{SUFFIX[side]}",
+        axis="-y",
+        side=side,
+        beside=f"ankle_{SUFFIX[side]}",
+    )
+    for side in SIDES
+}
+
+
+@cache
+def walker_skeleton(toes: bool = False, shelled: tuple[Side, ...] = ()) -> Skeleton:
+    """Return the skeleton of a walker: the planar one, further joints behind its ten.
+
+    Args:
+        toes: Whether a metatarsophalangeal joint carries the toes of each foot.
+        shelled: Sides whose orthosis is a body of its own: a shell that turns about a hinge on the
+            foot.
+    """
+    hinges = (_HINGES[side] for side in shelled)
+    return Skeleton((*PLANAR_WALKER.joints, *(_TOES if toes else ()), *hinges))
+
+
+EVERY_JOINT: Final = walker_skeleton(toes=True, shelled=SIDES)
+"""All joints that a walker may have."""

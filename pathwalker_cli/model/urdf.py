@@ -15,7 +15,7 @@ import pinocchio as pin
 from pathwalker_cli.conventions import GRAVITY, Condition
 from pathwalker_cli.model.anthropometry import Segment, Vector, segments
 from pathwalker_cli.model.contact import POINTS, TIPS, ContactPoint
-from pathwalker_cli.model.skeleton import PLANAR_WALKER, TOED_WALKER, Joint, Skeleton
+from pathwalker_cli.model.skeleton import PLANAR_WALKER, Joint, Skeleton
 from pathwalker_cli.patient import Patient
 
 _LIMITS: Final = '<limit lower="{0}" upper="{1}" effort="1000" velocity="100"/>'
@@ -23,7 +23,9 @@ _ANGLES: Final = _LIMITS.format(-3.2, 3.2)
 _TRAVEL: Final = _LIMITS.format(-1000, 1000)
 """A URDF must state limits; those of the optimal control problems stand in the study's config."""
 
-_AXES: Final = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+_AXES: Final = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1", "-y": "0 -1 0"}
+_REVERSED: Final = pin.SE3(np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
+"""A half turn about z, in which a hinge about -y is one about y."""
 
 
 def urdf_text(
@@ -45,11 +47,13 @@ def urdf_text(
         '  <link name="world"/>',
         *(line for joint in skeleton.joints if joint.root for line in _hung(joint)),
     ]
+    axes = {joint.coordinate: joint.axis for joint in skeleton.joints}
     for part in segments(patient, condition, published, values, skeleton):
         lines += _link(part)
         if part.parent:
-            lines += _joint(part.joint, part.parent, part.name, part.origin)
-    tips = TIPS if skeleton is TOED_WALKER else ()
+            axis = axes.get(part.joint, "y")
+            lines += _joint(part.joint, part.parent, part.name, part.origin, axis)
+    tips = (tip for tip in TIPS if tip.link in skeleton.links)
     for point in (*POINTS, *tips):
         x, z = point_place(patient, condition, point)
         lines.append(f'  <link name="{point.name}"/>')
@@ -109,8 +113,8 @@ def _link(part: Segment) -> list[str]:
     ]
 
 
-def _joint(name: str, parent: str, child: str, origin: Vector) -> list[str]:
-    """Return the lines of a hinge about +y of that name, or of a weld if it has none."""
+def _joint(name: str, parent: str, child: str, origin: Vector, axis: str = "y") -> list[str]:
+    """Return the lines of a hinge of that name about an axis, or of a weld if it has none."""
     head = f'name="{name}" type="revolute"' if name else f'name="{child}_weld" type="fixed"'
     lines = [
         f"  <joint {head}>",
@@ -119,7 +123,7 @@ def _joint(name: str, parent: str, child: str, origin: Vector) -> list[str]:
         f'    <origin xyz="{_numbers(origin)}"/>',
     ]
     if name:
-        lines += ['    <axis xyz="0 1 0"/>', f"    {_ANGLES}"]
+        lines += [f'    <axis xyz="{_AXES[axis]}"/>', f"    {_ANGLES}"]
     return [*lines, "  </joint>"]
 
 
@@ -140,18 +144,23 @@ def _ordered(parsed: pin.Model, skeleton: Skeleton) -> pin.Model:
     """Return the same model with its joints in the order of the skeleton.
 
     The parser sorts the children of a link by name, which puts the left leg before the right one.
+    Hinges about -y become hinges about y in frames that are turned by half a turn.
     """
     model: Any = pin.Model()
     model.name = parsed.name
-    new_index = {0: 0}
-    for name in skeleton.coordinates:
-        old = parsed.getJointId(name)
-        parent, placement = new_index[parsed.parents[old]], parsed.jointPlacements[old]
-        new_index[old] = model.addJoint(parent, parsed.joints[old], placement, name)
-        model.appendBodyToJoint(new_index[old], parsed.inertias[old], pin.SE3.Identity())
+    new_index, turns = {0: 0}, {0: pin.SE3.Identity()}
+    for each in skeleton.joints:
+        old = parsed.getJointId(each.coordinate)
+        parent, back = parsed.parents[old], each.axis == "-y"
+        turn = turns[old] = _REVERSED if back else pin.SE3.Identity()
+        kind = pin.JointModelRY() if back else parsed.joints[old]
+        placement = turns[parent].inverse() * parsed.jointPlacements[old] * turn
+        new_index[old] = model.addJoint(new_index[parent], kind, placement, each.coordinate)
+        model.appendBodyToJoint(new_index[old], parsed.inertias[old], turn.inverse())
     frame_index = {0: 0}
     for old, frame in enumerate(parsed.frames[1:], 1):
         joint, above = new_index[frame.parentJoint], frame_index[frame.parentFrame]
-        moved = pin.Frame(frame.name, joint, above, frame.placement, frame.type)
+        placement = turns[frame.parentJoint].inverse() * frame.placement
+        moved = pin.Frame(frame.name, joint, above, placement, frame.type)
         frame_index[old] = model.addFrame(moved, False)
     return model

@@ -31,7 +31,7 @@ from pathwalker_cli.model.elements.muscle import MuscleTorqueGenerator
 from pathwalker_cli.model.elements.orthosis import OrthosisSide
 from pathwalker_cli.model.numbers import Number, Unknown
 from pathwalker_cli.model.parts import Parts
-from pathwalker_cli.model.skeleton import Side, Skeleton
+from pathwalker_cli.model.skeleton import Build, Side, Skeleton
 from pathwalker_cli.model.urdf import frame_positions, pinocchio_model
 from pathwalker_cli.patient import Patient
 
@@ -92,6 +92,11 @@ class Walker:
     def device(self) -> Device:
         """What the patient walks with."""
         return self.parts.device
+
+    @property
+    def shelled(self) -> tuple[Side, ...]:
+        """Sides whose orthosis is a body of its own."""
+        return self.parts.shelled
 
     @property
     def elements(self) -> tuple[ForceElement, ...]:
@@ -164,11 +169,11 @@ class Walker:
         )
 
     @cached_property
-    def flat_footed(self) -> Walker:
-        """The walker as recordings know it, whose feet are in one piece."""
-        if not self.parts.toes:
+    def as_recorded(self) -> Walker:
+        """The walker as recordings know it: feet in one piece, an orthosis glued to the leg."""
+        parts = replace(self.parts, toes=False, orthosis="glued")
+        if parts.skeleton == self.skeleton:
             return self
-        parts = replace(self.parts, toes=False)
         walker = walker_of(self.patient, parts, self.published, self.backend)
         return walker.with_values({n.address: self.values[n.address] for n in parts.numbers})
 
@@ -245,7 +250,7 @@ class Walker:
         return self.element_forces(q, v, activation)[self.columns(self.muscles)]
 
     def orthosis_torques(self, q: Any, k_d: Any, k_p: Any) -> np.ndarray:
-        """Return the torques of the orthoses on the ankles.
+        """Return the torques of the orthoses on ankles, or hinges of their own.
 
         Args:
             q: Generalised coordinates [m, rad], shape (10,).
@@ -273,8 +278,34 @@ class Walker:
         """
         torques = np.zeros((*forces.shape[:-1], len(SIDES)))
         worn = [SIDES.index(side) for side in self.device.elements]
-        torques[..., worn] = forces[..., self.columns(self.device.forces)]
+        torques[..., worn] = forces[..., self.columns(self.device.elements.values())]
         return torques
+
+    def cuff_forces(self, q: np.ndarray, v: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """Return what the cuffs do to the legs at m instants, across and along the shank [N].
+
+        q [m, rad], v [m/s, rad/s] and the forces of all elements have m rows; right across, right
+        along, left across, left along have a column each, (m, 4): 0 where no orthosis is worn.
+        """
+        torques = dict(zip(SIDES, self.device_torques(forces).T, strict=True))
+        state, loads = self.state(q.T, v.T, [None] * len(self.muscles)), np.zeros((len(q), 4))
+        found = self.device.cuff_forces(state, self.values, torques)
+        for side, load in found.items():
+            loads[:, 2 * SIDES.index(side) : 2 * SIDES.index(side) + 2] = np.stack(load, axis=1)
+        return loads
+
+    def joint_torques_of(self, net: np.ndarray) -> np.ndarray:
+        """Return net forces (..., n) on all coordinates as the joints of the body feel them.
+
+        What turns beside a joint, as the hinge of an orthosis, counts with it: a laboratory, to
+        which leg and shell are one, finds the sum.
+        """
+        felt, skeleton = np.array(net), self.skeleton
+        for joint in skeleton.joints:
+            if joint.beside:
+                there, here = skeleton.index(joint.beside), skeleton.index(joint.coordinate)
+                felt[..., there] += net[..., here]
+        return felt
 
     def joint_torques(self, muscle: Any, orthosis: Any = (0.0, 0.0)) -> np.ndarray:
         """Return generalised forces of the actuators [N m], shape (10,); zero at the root.
@@ -287,7 +318,8 @@ class Walker:
         forces = np.zeros(sum(len(element.coordinates) for element in self.elements))
         forces[self.columns(self.muscles)] = _vector(muscle, len(self.muscles), "muscle")
         worn = [SIDES.index(side) for side in self.device.elements]
-        forces[self.columns(self.device.forces)] = _vector(orthosis, 2, "orthosis")[worn]
+        bent = self.columns(self.device.elements.values())
+        forces[bent] = _vector(orthosis, 2, "orthosis")[worn]
         return self.generalised_forces(forces)
 
     def contact_dynamics(
@@ -432,6 +464,7 @@ def build_walker(
     contact: Contact = HEEL_TOE,
     further: Sequence[str] = (),
     toes: bool = False,
+    orthosis: Build = "glued",
 ) -> Walker:
     """Return the walking model of a patient; see `Parts` and `walker_of`.
 
@@ -445,7 +478,7 @@ def build_walker(
             f"there is no condition {condition!r}", allowed=" or ".join(map(repr, CONDITIONS))
         )
     braced = patient.braced(condition)
-    parts = Parts(condition, tissue, feet, contact, tuple(further), braced, toes)
+    parts = Parts(condition, tissue, feet, contact, tuple(further), braced, toes, orthosis)
     return walker_of(patient, parts, published, backend, free)
 
 
@@ -480,7 +513,9 @@ def walker_of(
         patient=patient,
         parts=parts,
         model=model,
-        rigid_body=rigid_body_functions(model, frames, backend, shapes, parts.soles),
+        rigid_body=rigid_body_functions(
+            model, frames, backend, shapes, parts.soles, parts.moved_joints
+        ),
         values=values,
         unknowns=parts.unknowns(free),
         published=published,

@@ -198,6 +198,10 @@ class SpringSet(YamlModel):
         return value
 
 
+_HingePlace = Annotated[float, Quantity("m", -0.1, 0.1, *["is it in millimetres?"] * 2)]
+_CuffStiffness = Annotated[float, Quantity("N/m", 100.0, 1e8, below="is it in N/mm?")]
+_CuffDamping = Annotated[float, Quantity("N s/m", 0.0, 1e6, below="give its size, unsigned")]
+
 _STEEPEST: Final = 250.0
 """Largest ratio of the stiffnesses of stop and spring at which the torque is exact."""
 _STOP_CLEARANCE: Final = 1.06
@@ -224,6 +228,27 @@ def _in_order(value: tuple[Side, ...]) -> tuple[Side, ...]:
 WornSides = Annotated[tuple[Side, ...], AS_TUPLE, Field(min_length=1), AfterValidator(_in_order)]
 
 
+class Hinge(YamlModel):
+    """Where the hinge of a shell is in the frame of the foot, from the ankle [m]."""
+
+    forward: Worn[_HingePlace] | None = None
+    up: Worn[_HingePlace] | None = None
+
+
+class CuffStiffness(YamlModel):
+    """Stiffness of cuff and leg across the shank and along it [N/m]."""
+
+    across: Worn[_CuffStiffness] | None = None
+    along: Worn[_CuffStiffness] | None = None
+
+
+class CuffDamping(YamlModel):
+    """Damping of cuff and leg across the shank and along it [N s/m]."""
+
+    across: Worn[_CuffDamping] | None = None
+    along: Worn[_CuffDamping] | None = None
+
+
 class OrthosisData(YamlModel):
     """Ankle-foot orthosis: geometry and springs, angles in rad (+ = plantarflexion).
 
@@ -247,6 +272,9 @@ class OrthosisData(YamlModel):
     cuff_area: Worn[Annotated[float, Quantity("m^2", 1e-4, 0.1, above="is it in cm^2?")]] | None = (
         None
     )
+    cuff_stiffness: CuffStiffness | None = None
+    cuff_damping: CuffDamping | None = None
+    hinge: Hinge | None = None
 
     @model_validator(mode="before")
     @classmethod

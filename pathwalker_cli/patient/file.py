@@ -85,7 +85,7 @@ class Patient(YamlModel):
     examination: Examination = Examination()
     orthosis: OrthosisData | None = None
     recorded: dict[Condition, Recorded] = Field(default_factory=dict)
-    numbers: dict[str, Annotated[float, Quantity("SI units", -1e4, 1e4)]] = Field(
+    numbers: dict[str, Annotated[float, Quantity("SI units", -1e8, 1e8)]] = Field(
         default_factory=dict
     )
     _origin: _Origin = PrivateAttr(default=_Origin())
@@ -253,7 +253,7 @@ class Patient(YamlModel):
         return self.number(f"toes.length.{side}", TOES_SHARE * self.length("foot", side))
 
     def cuff_height(self, side: str) -> float:
-        """Return how far above the hinge the cuff of the orthosis presses on the leg [m]."""
+        """Return how far above the ankle the cuff of the orthosis presses on the leg [m]."""
         default = CUFF_HEIGHT * self.length("shank", side)
         return self.number(f"orthosis.cuff_height.{side}", default)
 

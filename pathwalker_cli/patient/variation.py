@@ -5,7 +5,7 @@ One way in for everything that asks "what if": cohorts, sensitivities and uncert
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from operator import add, mul
 from typing import Annotated, Any, Final
@@ -26,7 +26,7 @@ _LISTED: Final = 5
 """Numbers of a config that are told one by one."""
 
 Factor = Annotated[float, Quantity("", 0.01, 100.0)]
-Shift = Annotated[float, Quantity("SI units", -100.0, 100.0)]
+Shift = Annotated[float, Quantity("SI units", -1e6, 1e6)]
 
 
 class Variation(YamlModel):
@@ -64,7 +64,7 @@ def varied(
     """
     if not variation.scale and not variation.shift and not numbers:
         return patient
-    content = _filled_in(patient)
+    content = _filled_in(patient, (*variation.scale, *variation.shift))
     for address, value in (numbers or {}).items():
         _put(content, address, value)
     for place, factor in variation.scale.items():
@@ -85,8 +85,11 @@ def varied(
     return changed
 
 
-def _filled_in(patient: Patient) -> dict[str, Any]:
-    """Return the content of a patient's file with all lengths written out."""
+def _filled_in(patient: Patient, places: Collection[str]) -> dict[str, Any]:
+    """Return the content of a patient's file with all lengths written out.
+
+    Of the orthosis, what is at none of the places that are to be changed stays left out.
+    """
     content: dict[str, Any] = patient.model_dump(mode="json")
     lengths, points = content["segment_lengths"], content["contact_points"]
     for name in SegmentLengths.model_fields:
@@ -94,6 +97,15 @@ def _filled_in(patient: Patient) -> dict[str, Any]:
             lengths[name] = patient.length(name, "right")
     if points["barefoot"] is None:
         points["barefoot"] = patient.contacts("barefoot").model_dump(mode="json")
+    worn, still = content["orthosis"], dict.fromkeys(patient.braced("orthosis"), 0.0)
+    follows: dict[str, Any] = {
+        "cuff_height": {side: patient.cuff_height(side) for side in still},
+        "cuff_area": {side: patient.cuff_area(side) for side in still},
+        "hinge": {"forward": dict(still), "up": dict(still)},
+    }
+    for name, value in follows.items():
+        if worn and worn[name] is None and any(p.startswith(f"orthosis.{name}") for p in places):
+            worn[name] = value
     return {key: value for key, value in content.items() if value is not None}
 
 

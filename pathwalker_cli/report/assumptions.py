@@ -65,10 +65,11 @@ def _facts(run: ReportRun) -> dict[str, str]:
     result, config = run.run.result, run.run.config
     mesh, solver = config.mesh, config.solver
     toes = ", toes on a joint" if config.model.toes else ""
+    shell = "; orthosis: a body of its own" if config.shelled else ""
     quirks = ", with the quirks of the published model" if result.published_model else ""
     return {
         "Model": "flat rigid-body walker with 14 muscle torque generators; feet: "
-        f"{_FEET[config.model.feet]}{toes}; dynamics back end "
+        f"{_FEET[config.model.feet]}{toes}{shell}; dynamics back end "
         f"{_text(result.dynamics_backend)}{quirks}; assumed aim: {_aim(config)}",
         "Mass, strengths": ". ".join([
             f"body mass {run.patient.body_mass:g} kg and strengths from the patient's file",

@@ -383,4 +383,10 @@ def warm_start_run(folder: str | Path, config: StudyConfig) -> Run:
             where=f"--warm-start {folder}",
             allowed=f"model.toes {str(config.model.toes).lower()}, as in the config",
         )
+    if run.config.shelled != config.shelled:
+        raise DataError(
+            f"is a run of orthoses with model.orthosis {run.config.model.orthosis}",
+            where=f"--warm-start {folder}",
+            allowed=f"model.orthosis {config.model.orthosis}, as in the config",
+        )
     return run

@@ -54,7 +54,7 @@ def forces_table(series: GaitSeries) -> Trajectory:
     """Return ground reaction forces on the body over time.
 
     Per contact point, summed per foot, and the forward position of each foot's centre of pressure,
-    NaN where the foot is not loaded.
+    NaN where the foot is not loaded; then those of cuffs that yield on the legs.
     """
     feet: list[Column] = []
     for side in SIDES:
@@ -63,6 +63,10 @@ def forces_table(series: GaitSeries) -> Trajectory:
             (f"foot_{SUFFIX[side]}_z", "N", series.vertical_force(side)),
             (f"centre_of_pressure_{SUFFIX[side]}_x", "m", centre_of_pressure(series, side)),
         ]
+    for side in series.walker.shelled:
+        pair = series.cuff_force[:, 2 * SIDES.index(side) :].T
+        names = (f"cuff_{SUFFIX[side]}_{way}" for way in ("across", "along"))
+        feet += [(name, "N", force) for name, force in zip(names, pair, strict=False)]
     return _table(series, _columns(series.walker.pattern.force_names, "", "N", series.force), feet)
 
 
@@ -71,7 +75,7 @@ def torques_table(series: GaitSeries) -> Trajectory:
     orthoses = [f"orthosis_{SUFFIX[side]}" for side in SIDES]
     skeleton = series.walker.skeleton
     joints = [name for name in skeleton.coordinates if name not in skeleton.root]
-    net = series.net_torque[:, [skeleton.index(name) for name in joints]]
+    net = series.joint_torque[:, [skeleton.index(name) for name in joints]]
     return _table(
         series,
         _columns(GENERATORS, "_torque", "N m", series.muscle_torque),

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from pathwalker_cli.conventions import SIDES, STIFFNESSES, SUFFIX, to_degrees
 from pathwalker_cli.gait.solution import GaitSolution, LocalOptimum, Shortfall
-from pathwalker_cli.model.skeleton import TOED_WALKER
+from pathwalker_cli.model.skeleton import EVERY_JOINT
 from pathwalker_cli.ocp.violations import ActiveBound
 from pathwalker_cli.patient import OrthosisData
 from pathwalker_cli.stride.measures import TABLES, expanded, measure_of, measures_in
@@ -128,10 +128,17 @@ def _landing(metrics: Mapping[str, Any], side: str) -> str:
 
 
 def _cuff(metrics: Mapping[str, Any], side: str) -> str:
-    """Return the largest forces of a cuff and the pressure under it."""
+    """Return the largest forces of a cuff and the pressure under it, and how far it gives way."""
     shin, calf = (metrics[f"peak_{part}_force_{side}"] for part in ("shin", "calf"))
     pressure = metrics[f"peak_cuff_pressure_{side}"] / 1000.0
-    return f"{side} shin {shin:.0f} N, calf {calf:.0f} N ({pressure:.1f} kPa)"
+    text = f"{side} shin {shin:.0f} N, calf {calf:.0f} N ({pressure:.1f} kPa)"
+    if (slides := metrics.get(f"pistoning_{side}")) is None:
+        return text
+    into, beside = (metrics[f"{name}_{side}"] for name in ("cuff_depth", "hinge_difference"))
+    return (
+        f"{text}, {1000.0 * into:.1f} mm into the leg, sliding {1000.0 * slides:.1f} mm, ankle "
+        f"{np.rad2deg(beside):.1f} deg against the hinge"
+    )
 
 
 def summary(rows: Sequence[tuple[str, str]], notes: Iterable[str] = (), width: int = 0) -> str:
@@ -153,7 +160,7 @@ def summary_renderable(
     return Group(table, *(Text.assemble(("note: ", "yellow"), note) for note in notes))
 
 
-_ANGLES: Final = frozenset(TOED_WALKER.angles)
+_ANGLES: Final = frozenset(EVERY_JOINT.angles)
 _UNITS: Final = {"duration": "s", "walking_speed": "m/s", "distance": "m"}
 
 _MET: Final = 1e-6

@@ -57,6 +57,7 @@ class Measure:
         compared_as: Its key beside recordings, where that is another.
         kept: Whether `metrics.json` and the sensitivities have it.
         shown: Whether tables that do not name it have it too.
+        small: Whether people read it in millimetres.
     """
 
     key: str
@@ -73,6 +74,7 @@ class Measure:
     compared_as: str = ""
     kept: bool = True
     shown: bool = True
+    small: bool = False
 
     def __post_init__(self) -> None:
         """Let every name be the label unless it is given."""
@@ -105,17 +107,21 @@ class Measure:
     @property
     def shown_unit(self) -> str:
         """Unit for people: degrees for angles, none for plain numbers."""
+        if self.small:
+            return "mm"
         return "%" if self.is_share else _SHOWN_UNIT.get(self.unit, self.unit)
 
     @property
     def digits(self) -> int:
         """Digits behind the point for people."""
-        return 1 if self.is_share else _DIGITS.get(self.unit, 3)
+        return 1 if self.is_share or self.small else _DIGITS.get(self.unit, 3)
 
     def in_shown_unit(self, value: float) -> float:
         """Return a value in the unit for people."""
         if self.is_share:
             return 100.0 * value
+        if self.small:
+            return 1000.0 * value
         return float(to_degrees(value)) if self.unit == "rad" else value
 
     def text(self, value: float | None, sign: bool = False) -> str:

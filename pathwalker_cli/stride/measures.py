@@ -9,7 +9,7 @@ References:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final
@@ -27,6 +27,7 @@ from pathwalker_cli.conventions import (
     Side,
 )
 from pathwalker_cli.installed import load_installed
+from pathwalker_cli.model.elements import ForceElement
 from pathwalker_cli.stride.measure import (
     ANKLE,
     EFFORT,
@@ -107,9 +108,10 @@ def _peak_moments(stride: Stride, scale: float = 1.0) -> dict[str, float]:
 def _work(stride: Stride, muscles: bool, sign: float) -> float:
     """Return what muscles or orthoses did (+) or took up (-), each for itself [J]."""
     walker = stride.walker
-    columns = walker.columns(walker.muscles if muscles else walker.device.forces)
-    power = stride.known("element_power")[:, columns]
-    return sign * float(stride.weights @ np.maximum(sign * power, 0.0).sum(axis=1))
+    parts: Sequence[ForceElement] = walker.muscles if muscles else walker.device.forces
+    power = stride.known("element_power")
+    each = (sign * power[:, walker.columns([part])].sum(axis=1) for part in parts)
+    return sign * sum(float(stride.weights @ np.maximum(work, 0.0)) for work in each)
 
 
 def ankle_torque_line(stride: Stride, side: Side) -> tuple[float, float]:
@@ -179,12 +181,35 @@ def _rearmost_pressure(stride: Stride, side: Side) -> float:
     return float(((centre - ends[:, 0]) / np.diff(ends)[:, 0]).min())
 
 
+def _cuff_forces(stride: Stride, side: Side, axis: int) -> np.ndarray:
+    """Return what a cuff does to the leg, across (0) or along (1) the shank [N], shape (n,).
+
+    NaN where none is worn.
+    """
+    forces = stride.known("cuff_force")[:, 2 * SIDES.index(side) + axis]
+    return forces if side in stride.walker.device.cuffs else np.full_like(forces, np.nan)
+
+
 def _cuff_force(stride: Stride, side: Side, sign: float) -> float:
     """Return the largest force of a cuff on the shin (+) or the calf (-) [N]."""
-    torque = stride.known("orthosis_torque")[:, SIDES.index(side)]
-    if side not in stride.walker.device.elements:
-        return float("nan")
-    return float(max(0.0, (sign * torque).max()) / stride.walker.patient.cuff_height(side))
+    return float(np.maximum(0.0, (-sign * _cuff_forces(stride, side, 0)).max()))
+
+
+def _of_shell(of: Callable[[Stride, Side], float]) -> Callable[[Stride, Side], float]:
+    """Return the same measure of an orthosis that is a body of its own; others do not know it."""
+
+    def measured(stride: Stride, side: Side) -> float:
+        if side not in stride.walker.shelled:
+            raise NotKnownError("shell")
+        return float(of(stride, side))
+
+    return measured
+
+
+def _beside(stride: Stride, side: Side) -> float:
+    """Return the largest difference of the angles of ankle and hinge [rad]."""
+    ankle, hinge = (stride.column(f"{joint}_{SUFFIX[side]}") for joint in ("ankle", "hinge"))
+    return float(np.abs(ankle - hinge).max())
 
 
 def _cuff_pressure(stride: Stride, side: Side) -> float:
@@ -321,14 +346,28 @@ REGISTRY: tuple[Measure, ...] = (
               part="stance", kept=False),
     *_extensor_measures(),
     *per_side("peak_shin_force_*", "cuff on the shin, *", "N",
-              "largest force of the cuff on the front of the leg, as the orthosis resists "
-              "dorsiflexion: its torque over the height of the cuff",
+              "largest force of the cuff across the front of the leg, as the orthosis resists "
+              "dorsiflexion; of one that is glued, its torque over the height of the cuff",
               partial(_cuff_force, sign=1.0), section=LOADS),
     *per_side("peak_calf_force_*", "cuff on the calf, *", "N",
               "largest force of the cuff on the calf, as the orthosis resists plantarflexion",
               partial(_cuff_force, sign=-1.0), section=LOADS),
     *per_side("peak_cuff_pressure_*", "pressure under the cuff, *", "Pa",
               "the larger of both over the area of the cuff", _cuff_pressure, section=LOADS),
+    *per_side("peak_cuff_shear_*", "cuff along the shank, *", "N",
+              "largest force of the cuff along the shank; of an orthosis that is a body of its own",
+              _of_shell(lambda s, side: np.abs(_cuff_forces(s, side, 1)).max()), section=LOADS),
+    *per_side("pistoning_*", "pistoning, *", "m",
+              "how far the cuff slides along the leg, from its lowest to its highest; likewise",
+              _of_shell(lambda s, side: np.ptp(s.cuff_shift(side)[:, 1])), section=LOADS,
+              small=True),
+    *per_side("cuff_depth_*", "cuff into the leg, *", "m",
+              "how deep the cuff is pressed into shin or calf at most; likewise",
+              _of_shell(lambda s, side: np.abs(s.cuff_shift(side)[:, 0]).max()), section=LOADS,
+              small=True),
+    *per_side("hinge_difference_*", "ankle against hinge, *", "rad",
+              "largest difference of the angles of ankle and hinge; likewise", _of_shell(_beside),
+              section=LOADS),
     *per_side("dorsiflexion_stiffness_*", "K_D *", "N m/rad", "K_D; `null` when barefoot",
               partial(_stiffness, first=0), "K_D, *", "K_D *", section=EFFORT),
     *per_side("plantarflexion_stiffness_*", "K_P *", "N m/rad", "K_P; `null` when barefoot",
@@ -359,8 +398,9 @@ TABLES: Final[Mapping[str, Sequence[str]]] = {
         "swing_share_*", "double_support_share", _CROUCH, "peak_vertical_force_*_body_weights",
         "ankle_torque_slope_*", "max_friction_ratio_*", "positive_muscle_work",
         "negative_muscle_work", "positive_orthosis_work", "negative_orthosis_work",
-        "peak_shin_force_*", "peak_calf_force_*", "peak_cuff_pressure_*",
-        "effort_per_distance", *_SPRINGS, "cost",
+        "peak_shin_force_*", "peak_calf_force_*", "peak_cuff_pressure_*", "peak_cuff_shear_*",
+        "pistoning_*", "cuff_depth_*", "hinge_difference_*", "effort_per_distance", *_SPRINGS,
+        "cost",
     ),
     "batch": ("cost", "walking_speed", "step_length_*", _CROUCH, *_SPRINGS,
               "effort_per_distance"),

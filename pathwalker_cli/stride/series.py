@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from pathwalker_cli.model.elements.muscle import excitation_from_rate
+from pathwalker_cli.model.skeleton import Side
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
 
@@ -37,6 +38,15 @@ class Sampled:
     def column(self, coordinate: str) -> np.ndarray:
         """Return one generalised coordinate over time, shape (n,)."""
         return np.asarray(self.q[:, self.walker.skeleton.index(coordinate)])
+
+    def cuff_shift(self, side: Side) -> np.ndarray:
+        """Return how far the cuff of a side is off its place on the leg, see `Cuff.shift`; [m].
+
+        Across the shank and along it, shape (n, 2).
+        """
+        walker = self.walker
+        state = walker.state(self.q.T, 0.0 * self.q.T, [None] * len(walker.muscles))
+        return np.stack(walker.device.cuffs[side].shift(state, walker.values), axis=1)
 
 
 @dataclass(frozen=True)
@@ -93,6 +103,11 @@ class GaitSeries(Sampled):
         return self.walker.device_torques(self.element_force)
 
     @cached_property
+    def cuff_force(self) -> np.ndarray:
+        """Forces of the cuffs on the legs [N], (n, 4); see `Walker.cuff_forces`."""
+        return self.walker.cuff_forces(self.q, self.v, self.element_force)
+
+    @cached_property
     def passive_torque(self) -> dict[str, np.ndarray]:
         """Torque of passive tissue by coordinate [N m], each (n,); empty without tissue."""
         tissue = self.walker.tissue
@@ -119,6 +134,11 @@ class GaitSeries(Sampled):
     def net_torque(self) -> np.ndarray:
         """Sum of the forces of all elements per coordinate [N m], shape (n, 10)."""
         return self.walker.generalised_forces(self.element_force)
+
+    @cached_property
+    def joint_torque(self) -> np.ndarray:
+        """The same as the joints of the body feel it, (n, 10); see `Walker.joint_torques_of`."""
+        return self.walker.joint_torques_of(self.net_torque)
 
     @cached_property
     def quadrature(self) -> np.ndarray:

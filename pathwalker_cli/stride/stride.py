@@ -55,9 +55,11 @@ class Stride(Sampled):
         v: Generalised velocities [m/s, rad/s], shape (n, 10).
         force: Per side, ground reaction force on the foot (forward, up) [N], shape (n, 2).
         point_force: Forces in the order of `walker.pattern.forces` [N], shape (n, 8).
-        net_torque: Sum of muscle and orthosis torques per coordinate [N m], shape (n, 10).
+        net_torque: Sum of muscle and orthosis torques per joint of the body [N m], shape (n, 10).
         muscle_torque: Torque of each generator [N m], shape (n, 14).
         orthosis_torque: Torques of the orthoses right, left [N m], shape (n, 2).
+        cuff_force: Forces of the cuffs on the legs [N], right across and along the shank, then
+            left, shape (n, 4).
         element_power: Powers in the order of `walker.elements` [W], shape (n, k).
         activation: Activation of each generator, shape (n, 14).
         quadrature: Weights of an integral over time [s], shape (n,); trapezoids if left out.
@@ -85,6 +87,7 @@ class Stride(Sampled):
     net_torque: np.ndarray | None = None
     muscle_torque: np.ndarray | None = None
     orthosis_torque: np.ndarray | None = None
+    cuff_force: np.ndarray | None = None
     element_power: np.ndarray | None = None
     activation: np.ndarray | None = None
     quadrature: np.ndarray | None = None
@@ -96,6 +99,7 @@ class Stride(Sampled):
     def __post_init__(self) -> None:
         """Check the shapes."""
         n, columns = self.time.size, {"muscle_torque": len(GENERATORS), "orthosis_torque": 2}
+        columns |= {"cuff_force": 4}
         columns |= dict.fromkeys(("q", "v", "net_torque"), self.walker.skeleton.size)
         pattern = self.walker.pattern
         columns |= {"activation": len(GENERATORS), "point_force": len(pattern.forces)}
@@ -272,9 +276,10 @@ def stride_of(
             for side in SIDES
         },
         point_force=series.force,
-        net_torque=series.net_torque,
+        net_torque=series.joint_torque,
         muscle_torque=series.muscle_torque,
         orthosis_torque=series.orthosis_torque,
+        cuff_force=series.cuff_force,
         element_power=series.element_power,
         activation=series.activation,
         quadrature=series.quadrature,
@@ -425,13 +430,39 @@ def centre_of_pressure(series: GaitSeries, side: Side) -> np.ndarray:
 def body_points(walker: Walker, q: np.ndarray) -> dict[str, np.ndarray]:
     """Return positions of joints, heels, toes, neck and head (x, z) [m], of toes also their tips.
 
+    Of an orthosis that is a body of its own, its hinge and where its shell would have knee and
+    ankle ("shell_knee_r").
+
     Args:
         walker: Who walks.
         q: Generalised coordinates, shape (10,), or (n, 10) for positions of shape (n, 2).
     """
     ends = ("hip", "knee", "ankle", "heel", "toe", *(["tip"] if walker.parts.toes else []))
     legs = [f"{name}_{s}" for name in ends for s in "rl"]
-    points = walker.frames(q, (*legs, "lumbar", "head"))
+    hinges = [f"hinge_{SUFFIX[side]}" for side in walker.shelled]
+    points = walker.frames(q, (*legs, "lumbar", "head", *hinges))
     points["neck"] = points.pop("head")
     points["head"] = points["neck"] + 0.25 * (points["neck"] - points["lumbar"])
+    for side in walker.shelled:
+        points |= _shell_points(walker, q, points, side)
     return points
+
+
+def _shell_points(
+    walker: Walker, q: np.ndarray, points: Mapping[str, np.ndarray], side: Side
+) -> dict[str, np.ndarray]:
+    """Return knee and ankle of the shank as if they were on the shell [m]."""
+    s, values, cuff = SUFFIX[side], walker.values, walker.device.cuffs[side]
+    shank = points[f"knee_{s}"] - points[f"ankle_{s}"]
+    length = float(np.linalg.norm(shank, axis=-1).max())
+    along = shank / length
+    across = np.stack([along[..., 1], -along[..., 0]], axis=-1)
+    columns = np.moveaxis(np.asarray(q, float), -1, 0)
+    state = walker.state(columns, np.zeros_like(columns), [None] * len(walker.muscles))
+    shell = {}
+    for name, height in (("knee", length), ("ankle", 0.0)):
+        x, z = cuff.shift(state, {**values, f"orthosis.cuff_height.{side}": height})
+        shell[f"shell_{name}_{s}"] = (
+            points[f"{name}_{s}"] + np.expand_dims(x, -1) * across + np.expand_dims(z, -1) * along
+        )
+    return shell

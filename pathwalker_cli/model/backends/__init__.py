@@ -19,6 +19,7 @@ import pinocchio as pin
 from pathwalker_cli.errors import BackendError
 from pathwalker_cli.model.backends import bindings, compiled, direct
 from pathwalker_cli.model.backends.functions import (
+    PLACE_ENTRIES,
     RigidBodyFunctions,
     Topology,
     all_parameters,
@@ -64,6 +65,7 @@ def rigid_body_functions(
     backend: str = "auto",
     shapes: Sequence[float] = (),
     soles: bool = False,
+    moved: Sequence[str] = (),
 ) -> RigidBodyFunctions:
     """Build the symbolic dynamics and kinematics of a planar model.
 
@@ -76,6 +78,8 @@ def rigid_body_functions(
         backend: One of `BACKENDS`, or "auto" for the first one available.
         shapes: Radius of the circle of each point [m], then roundness of each sole; none: points.
         soles: Whether the points of one body are the ends of a sole, see `functions.touching`.
+        moved: Names of joints whose place in the plane, and whose body's centre of mass, stay
+            symbols where they are zero.
 
     Raises:
         BackendError: The back end does not exist or cannot be used here, or the model has joints
@@ -87,7 +91,9 @@ def rigid_body_functions(
         raise BackendError(f"there is no back end {name!r}; available: {allowed}")
     topology = Topology.of(model, points, soles)
     parameters = all_parameters(model, points, shapes)
-    nonzero = tuple((parameters != 0.0).tolist())
+    kept = {f"{joint}.{entry}" for joint in moved for entry in PLACE_ENTRIES}
+    names = np.array([name in kept for name in topology.parameter_names])
+    nonzero = tuple(((parameters != 0.0) | names).tolist())
     values = parameters[np.array(nonzero, dtype=bool)]
     values.setflags(write=False)
     named = zip(topology.parameter_names, nonzero, strict=True)

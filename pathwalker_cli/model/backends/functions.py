@@ -44,6 +44,9 @@ JOINT_ENTRIES = (
 """Parameters of a moving joint, in order: translation from its parent joint [m], mass [kg], centre
 of mass [m] and inertia about it [kg m^2] of the body it moves, in the axes of the joint frame."""
 
+PLACE_ENTRIES = ("placement.x", "placement.z", "com.x", "com.z")
+"""What of a joint in the x-z plane and of its body is another where the joint is moved."""
+
 POINT_ENTRIES = tuple(f"position.{axis}" for axis in "xyz")
 """Parameters of a point, in order: its position in the frame of its joint [m]."""
 

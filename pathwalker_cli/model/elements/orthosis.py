@@ -1,4 +1,4 @@
-"""The ankle-foot orthosis as a force element: a five-stage torque-angle curve at the ankle.
+"""The ankle-foot orthosis as a force element: a five-stage torque-angle curve at its joint.
 
 References:
     Sreenivasa et al. (2017), figure 2 and table 2.
@@ -177,9 +177,15 @@ then the fields of `OrthosisSide`."""
 
 @dataclass(frozen=True)
 class AnkleOrthosis:
-    """The orthosis of one side as a force element."""
+    """The joint of the orthosis of one side as a force element.
+
+    Args:
+        side: The side.
+        joint: What it bends: "ankle", to which it is glued, or a "hinge" of its own.
+    """
 
     side: Side
+    joint: str = "ankle"
 
     @property
     def name(self) -> str:
@@ -188,8 +194,8 @@ class AnkleOrthosis:
 
     @property
     def coordinates(self) -> tuple[str]:
-        """The ankle."""
-        return (f"ankle_{SUFFIX[self.side]}",)
+        """The ankle, or the hinge."""
+        return (f"{self.joint}_{SUFFIX[self.side]}",)
 
     @cached_property
     def numbers(self) -> tuple[Number, ...]:
@@ -216,9 +222,9 @@ class AnkleOrthosis:
     def forces(
         self, state: State, numbers: Mapping[str, Any], curve: Curve = plain
     ) -> tuple[Any, ...]:
-        """Return the torque on the ankle [N m]; see `ForceElement.forces`."""
-        (ankle,) = self.coordinates
-        return (curve(_torque, state.q[ankle], *self._values(numbers)),)
+        """Return the torque on its joint [N m]; see `ForceElement.forces`."""
+        (joint,) = self.coordinates
+        return (curve(_torque, state.q[joint], *self._values(numbers)),)
 
 
 def _torque(angle: Any, k_d: Any, k_p: Any, *fixed: Any) -> Any:

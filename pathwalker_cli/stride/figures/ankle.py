@@ -45,7 +45,7 @@ def _draw_orthosis(ax: Axes, series: GaitSeries, side: Side, orthosis: OrthosisS
     """Draw curve, walked part, stops and stiffness of one orthosis."""
     i, colour = SIDES.index(side), style.LINE_COLOUR[side]
     k_d, k_p = float(series.stiffness[i]), float(series.stiffness[i + 2])
-    angle = series.column(f"ankle_{SUFFIX[side]}")
+    angle = series.column(*series.walker.device.elements[side].coordinates)
     stops = (orthosis.dorsiflexion_stop, orthosis.plantarflexion_stop)
     low, high = min(*stops, angle.min()) - 0.03, max(*stops, angle.max()) + 0.03
     style.zero_line(ax)
@@ -92,7 +92,7 @@ def _draw_profile(ax: Axes, series: GaitSeries, side: Side) -> None:
     """Draw the torque-angle path of one ankle and its slope under load."""
     name = f"ankle_{SUFFIX[side]}"
     angle = -series.column(name)
-    torque = series.net_torque[:, COORDINATES.index(name)]
+    torque = series.joint_torque[:, COORDINATES.index(name)]
     stride = stride_of(series)
     bearing = toe_bearing(stride, side)
     look = style.side_line(side)

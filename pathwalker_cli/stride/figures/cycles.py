@@ -116,6 +116,39 @@ def toe_joints(series: GaitSeries, reference: Reference | None = None) -> Figure
         _draw_side(panels[2], series, side, 100.0 * tips[side] / walker.weight)
     titles = {"Toes, extension +": "extension [deg]", "Toe joint, flexing +": "moment [N m/kg]",
               "Tips of the toes": "force [% body weight]"}  # fmt: skip
+    _dress_cycles(panels, series, titles)
+    return fig
+
+
+def cuffs(series: GaitSeries, reference: Reference | None = None) -> Figure:
+    """Return what shells do to the leg over the gait cycle of each side that wears one.
+
+    How much further than the hinge the ankle is dorsiflexed, the force of the cuff on shin (+) or
+    calf, and how far the cuff is up the leg from where it was fitted.
+
+    Raises:
+        InputError: If no orthosis is a body of its own.
+    """
+    walker = series.walker
+    if not walker.shelled:
+        raise InputError("there is no orthosis of its own", allowed="model.orthosis body")
+    fig = style.new_figure(2.9)
+    panels = fig.subplots(2, 2).ravel()
+    for side in walker.shelled:
+        ankle, hinge = (series.column(f"{name}_{SUFFIX[side]}") for name in ("ankle", "hinge"))
+        _draw_side(panels[0], series, side, to_degrees(hinge - ankle))
+        across = series.cuff_force[:, 2 * SIDES.index(side)]
+        _draw_side(panels[1], series, side, -100.0 * across / walker.weight)
+        _draw_side(panels[2], series, side, 1000.0 * series.cuff_shift(side)[:, 1])
+    titles = {"Ankle beyond the hinge": "dorsiflexion [deg]",
+              "Cuff on the shin +, calf -": "force [% body weight]",
+              "Cuff up the leg": "pistoning [mm]"}  # fmt: skip
+    _dress_cycles(panels, series, titles)
+    return fig
+
+
+def _dress_cycles(panels: Sequence[Axes], series: GaitSeries, titles: Mapping[str, str]) -> None:
+    """Give panels their titles, labels and events; the last one is the legend's."""
     for ax, (title, label) in zip(panels, titles.items(), strict=False):
         style.dress(ax, title, y=label)
         style.zero_line(ax)
@@ -123,7 +156,6 @@ def toe_joints(series: GaitSeries, reference: Reference | None = None) -> Figure
             style.toe_off_line(ax, own_cycle(series, side))
         style.percent_axis(ax)
     style.legend_panel(panels[-1], [*style.side_handles(), style.events_handle()])
-    return fig
 
 
 def ground_forces(series: GaitSeries, reference: Reference | None = None) -> Figure:

@@ -14,6 +14,7 @@ from pathwalker_cli.stride.figures.ankle import ankle_torque, orthosis_curves
 from pathwalker_cli.stride.figures.curves import Reference
 from pathwalker_cli.stride.figures.cycles import (
     activations,
+    cuffs,
     ground_forces,
     joint_angles,
     joint_moments,
@@ -38,6 +39,7 @@ FIGURES: Final[dict[str, Callable[[GaitSeries, Reference | None], Figure]]] = {
     "ankle_torque": ankle_torque,
     "orthosis_curves": orthosis_curves,
     "toe_joints": toe_joints,
+    "cuffs": cuffs,
 }
 """Names of the figures and what makes them."""
 
@@ -52,6 +54,7 @@ def figure_names(series: GaitSeries) -> tuple[str, ...]:
     """Return the figures that make sense for a stride: no orthosis curve when barefoot."""
     walker = series.walker
     special = {"orthosis_curves": walker.device.worn, "toe_joints": walker.parts.toes}
+    special["cuffs"] = bool(walker.shelled)
     return tuple(name for name in FIGURES if special.get(name, True))
 
 

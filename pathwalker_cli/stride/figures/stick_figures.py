@@ -125,9 +125,11 @@ def _draw_body(ax: Axes, points: dict[str, np.ndarray], braced: Sequence[Side]) 
         if f"tip_{s}" in points:
             _draw_chain(ax, points, (f"toe_{s}", f"tip_{s}"), look | {"linewidth": 0.8})
         if side in braced:
-            calf = 0.25 * points[f"ankle_{s}"] + 0.75 * points[f"knee_{s}"]
-            shell = {"calf": calf, **points}
-            _draw_chain(ax, shell, ("calf", f"ankle_{s}", f"heel_{s}", f"toe_{s}"), _BRACE)
+            ankle, knee = (
+                points.get(f"shell_{n}_{s}", points[f"{n}_{s}"]) for n in ("ankle", "knee")
+            )
+            shell = {"calf": 0.25 * ankle + 0.75 * knee, "joint": ankle, **points}
+            _draw_chain(ax, shell, ("calf", "joint", f"heel_{s}", f"toe_{s}"), _BRACE)
     trunk = {"color": style.BODY_COLOUR["right"], "linewidth": 1.6, "zorder": 4}
     _draw_chain(ax, points, ("lumbar", "neck"), trunk)
     radius = float(np.linalg.norm(points["head"] - points["neck"]))
