@@ -33,7 +33,7 @@ from pathwalker_cli.io.json_file import read_json
 from pathwalker_cli.io.recordings import recording_names
 from pathwalker_cli.paths import shipped
 from pathwalker_cli.patient import load_patient
-from pathwalker_cli.stride.measures import metrics_of
+from pathwalker_cli.stride.measures import measure_of, metrics_of
 from pathwalker_cli.stride.stride import Stride
 
 CHILD: Final = "sreenivasa2017-patient"
@@ -154,15 +154,30 @@ def cells(stride: Stride, recorded: RecordedGait) -> Iterator[str]:
     yield ", ".join(f"{found[f'step_length_{side}']:.3f}" for side in SIDES)
 
 
+FORCES: Final = {
+    "vertical peak [body weights]": ("peak_vertical_force_{}_body_weights", 2),
+    "ankle torque slope [N m/rad]": ("ankle_torque_slope_stance_{}", 0),
+    "ankle torque peak [N m]": ("peak_net_ankle_torque_{}", 0),
+}
+
+
 def forces(stride: Stride, recorded: RecordedGait) -> Iterator[str]:
-    """Yield vertical force [N], its peaks [body weights], ankles' slopes [N m/rad], peaks [N m]."""
+    """Yield the difference of vertical forces in stance, and what else forces say."""
     yield f"vertical RMS {force_rms(stride, recorded)['rms_vertical_force_stance']:.0f} N"
-    found = metrics_of(stride)
-    for key, digits in (("peak_vertical_force_{}_body_weights", 2),
-                        ("ankle_torque_slope_stance_{}", 0),
-                        ("peak_net_ankle_torque_{}", 0)):  # fmt: skip
-        values = (f"{found[key.format(side)]:.{digits}f}" for side in SIDES)
-        yield f"{key.replace('_{}', '').replace('_', ' ')} {', '.join(values)}"
+    for label, (key, digits) in FORCES.items():
+        values = (measure_of(key.format(side)).of(stride) for side in SIDES)
+        yield f"{label} {', '.join(f'{value:.{digits}f}' for value in values)}"
+
+
+def own_forces(recorded: RecordedGait) -> Iterator[str]:
+    """Yield the same of the child's own stances, with their ranges."""
+    spread = recorded_force_rms(recorded)["rms_vertical_force_stance"]
+    yield f"vertical RMS {spread.mean:.0f} ({spread.low:.0f} to {spread.high:.0f}) N"
+    for label, (key, digits) in FORCES.items():
+        measures = [measure_of(key.format(side)) for side in SIDES]
+        found = recorded_numbers(recorded, measures).values()
+        spans = (f"{x.mean:.{digits}f} ({x.low:.{digits}f} to {x.high:.{digits}f})" for x in found)
+        yield f"{label} {', '.join(spans)}"
 
 
 def own(recorded: RecordedGait) -> Iterator[str]:
@@ -201,7 +216,7 @@ def main(folder: Path, wanted: list[str]) -> None:
                 raise DataError("there are no recordings", where=condition)
             known[condition] = recorded
             print(f"| {condition}, own cycles | {' | '.join(own(recorded))} |")
-            print(f"  vertical RMS {recorded_force_rms(recorded)}")
+            print(f"  {'; '.join(own_forces(recorded))}")
         print(f"| {name} | {' | '.join(cells(stride, known[condition]))} |")
         print(f"  {'; '.join(forces(stride, known[condition]))}", flush=True)
 
