@@ -15,6 +15,7 @@ from pathwalker_cli.conventions import COORDINATES, coordinate_unit
 from pathwalker_cli.io.c3d_events import Event
 from pathwalker_cli.io.recordings import CompactRecording, write_recording
 from pathwalker_cli.model.landing import TOE_FIRST
+from pathwalker_cli.studies.batch.cases import load_cases
 from pathwalker_cli.trajectory import Trajectory
 
 FRAMES = 60
@@ -31,7 +32,9 @@ def child(folder: Path, strike: tuple[float, float], later: tuple[float, float])
     case = load_case("mapd-barefoot")
     walker, source = case.walker(), case.unvaried.source
     assert source is not None
-    (folder / "patient.yaml").write_text(Path(source).read_text(encoding="utf-8"), encoding="utf-8")
+    text = Path(source).read_text(encoding="utf-8").replace(case.patient.id, folder.name)
+    folder.mkdir(exist_ok=True)
+    (folder / "patient.yaml").write_text(text, encoding="utf-8")
     values = np.zeros((FRAMES, len(COORDINATES)))
     soles = walker.foot_points(values[0])
     for i, ankle in enumerate(("ankle_r", "ankle_l")):
@@ -90,6 +93,16 @@ def test_one_side_may_be_given_and_the_mesh_suits_what_is_found(tmp_path: Path) 
     ])  # fmt: skip
     assert result.exit_code == 2
     assert "has 4 entries in mesh.intervals" in result.output
+
+
+def test_a_batch_takes_the_pattern_of_each_child(tmp_path: Path) -> None:
+    child(tmp_path / "anna", (15.0, 15.0), (0.0, 0.0))
+    child(tmp_path / "ben", (-12.0, -12.0), (-12.0, -12.0))
+    study = "patients: [anna, ben]\nproblems: [mapd-barefoot]\nset: {model.contact: recorded}\n"
+    (tmp_path / "both.yaml").write_text(study, encoding="utf-8")
+    cases = load_cases(tmp_path / "both.yaml").cases
+    uses = [[use.name for use in case.study.config.model.uses] for case in cases]
+    assert uses == [["heel_toe"] * 2, ["toe"] * 2]
 
 
 @pytest.mark.parametrize("config", ["mapd-healthy", "predict-orthosis"])
