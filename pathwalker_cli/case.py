@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pathwalker_cli.config import StudyConfig, load_config, with_values
+from pathwalker_cli.config.schema import plain_use
 from pathwalker_cli.errors import PatientError
 from pathwalker_cli.io.yaml_file import yaml_text
+from pathwalker_cli.model.contact import AS_RECORDED, HEEL_TOE
+from pathwalker_cli.model.skeleton import SIDES
 from pathwalker_cli.patient import Patient, load_patient
 from pathwalker_cli.patient.variation import varied
 
@@ -52,7 +55,29 @@ class Case:
         except PatientError as error:
             raise error.at(error.where or "patient") from None
         _ = case.patient  # what does not fit is refused here, where it is read
-        return case
+        return case.landed
+
+    @property
+    def landed(self) -> Case:
+        """The case with feet that land as their recordings show, where the config asks for that.
+
+        Raises:
+            DataError: If no recording shows it.
+            ConfigError: If the config does not suit what they show.
+        """
+        model = self.config.model
+        if AS_RECORDED not in model.uses:
+            return self
+        from pathwalker_cli.model.landing import recorded_use  # takes long: only who needs it
+        from pathwalker_cli.model.walker import walker_of
+
+        parts = replace(self.parts, contact=HEEL_TOE, toes=False)
+        walker = walker_of(self.patient, parts, model.published)
+        uses = {
+            side: plain_use(recorded_use(walker, side) if use == AS_RECORDED else use)
+            for side, use in zip(SIDES, model.uses, strict=True)
+        }
+        return self.with_values({"model.contact": uses})
 
     @cached_property
     def patient(self) -> Patient:
@@ -99,7 +124,7 @@ class Case:
         config = with_values(self.config, values, where)
         if config.patient != self.config.patient:
             return Case.of(config)
-        return replace(self, config=config)
+        return replace(self, config=config).landed
 
     @property
     def content_hash(self) -> str | None:

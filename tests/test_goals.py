@@ -92,6 +92,52 @@ def test_values_are_those_of_the_formulas() -> None:
     assert "discomfort" not in goal_values(motion, WALKER, {})
 
 
+def test_the_loading_rate_is_that_of_forces_known_in_closed_form() -> None:
+    """Both places of a foot share its load, which rises by a polynomial that a mesh holds."""
+    motion, phases, wanted = stylised_series("barefoot").motion, [], 0.0
+    for phase in motion.phases:
+        contact, at = phase_named(phase.name), phase.point_fractions
+        algebraic = phase.algebraic.copy()
+        for i, force in enumerate(contact.forces):
+            size = 1.0 + (force.point.side == "left")
+            algebraic[..., N + i] = size * WEIGHT * (3.0 * at**2 - at)
+        phases.append(replace(phase, algebraic=algebraic))
+        for side in contact.feet:
+            places = sum(force.bears for force in contact.forces if force.point.side == side)
+            size = places * (1.0 + (side == "left"))
+            # the mean of (6 s - 1)^2 over s from 0 to 1 is 7
+            wanted += 7.0 * size**2 / phase.duration
+    made = replace(motion, phases=tuple(phases))
+    distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
+    value = goal_values(made, WALKER, {})["loading_rate"]
+    assert value == pytest.approx(wanted / distance, rel=1e-9)
+    # forces that do not change cost nothing
+    assert goal_values(motion, WALKER, {})["loading_rate"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_gentle_loading_costs_what_finer_differences_of_the_solution_say() -> None:
+    config = smoke_version(load_config("mapd-barefoot"))
+    weighed = with_values(config, {"cost.goals": {"loading_rate": 3e-3}})
+    plain, gentle = solve_study(config), solve_study(weighed)
+    assert gentle.converged
+    rates = []
+    for solution in (plain, gentle):
+        motion, total = solution.last_motion, 0.0
+        for phase in motion.phases:
+            forces = phase_named(phase.name).forces
+            for start, end in zip(phase.mesh, phase.mesh[1:], strict=False):
+                at = np.linspace(start, end, 2001)[1:-1]
+                force = phase.algebraic_at(at)[:, N : N + len(forces)]
+                for side in ("right", "left"):
+                    mine = [i for i, f in enumerate(forces) if f.bears and f.point.side == side]
+                    rate = np.gradient(force[:, mine].sum(axis=1), at * phase.duration)
+                    total += float(np.mean((rate / WEIGHT) ** 2)) * (end - start) * phase.duration
+        distance = motion.phases[-1].states[-1, 0] - motion.phases[0].states[0, 0]
+        rates.append(total / distance)
+    assert gentle.cost_terms["loading_rate"] == pytest.approx(3e-3 * rates[1], rel=1e-2)
+    assert rates[1] < 0.8 * rates[0]
+
+
 def test_cuffs_press_with_the_torque_over_their_height() -> None:
     series = stylised_series("orthosis")
     walker, stride = series.walker, stride_of(series)
@@ -145,15 +191,17 @@ def test_derivatives_of_running_costs_are_those_of_differences(name: str, phase:
     def costs(x: np.ndarray) -> np.ndarray:
         parts = [list(part) for part in np.split(x, np.cumsum(sizes)[:-1])]
         point = Instant(
-            phase, *parts, heights=parts[0][:2], speeds=parts[1][:2], cuffs=parts[0][2:6]
-        )
+            phase, *parts, force_rate=parts[3][::-1],
+            heights=parts[0][:2], speeds=parts[1][:2], cuffs=parts[0][2:6],
+        )  # fmt: skip
         return np.array(goals.integrands(point, numbers, goals.goals), dtype=float)
 
     x = ca.SX.sym("x", sum(sizes))
     parts = [ca.vertsplit(part) for part in ca.vertsplit(x, [0, *np.cumsum(sizes).tolist()])]
     point_of_symbols = Instant(
-        phase, *parts, heights=parts[0][:2], speeds=parts[1][:2], cuffs=parts[0][2:6]
-    )
+        phase, *parts, force_rate=parts[3][::-1],
+        heights=parts[0][:2], speeds=parts[1][:2], cuffs=parts[0][2:6],
+    )  # fmt: skip
     symbols = ca.vertcat(*goals.integrands(point_of_symbols, numbers, goals.goals))
     jacobian = np.asarray(ca.Function("j", [x], [ca.jacobian(symbols, x)])(point))
     assert np.asarray(ca.Function("c", [x], [symbols])(point)).ravel() == pytest.approx(
@@ -220,6 +268,12 @@ def test_goals_that_cannot_be_are_refused(
 ) -> None:
     with pytest.raises(ConfigError, match=sentence):
         with_values(load_config(problem), {f"cost.{key}": v for key, v in changes.items()})
+
+
+def test_a_goal_of_rates_of_forces_is_refused_by_multiple_shooting() -> None:
+    changes = {"cost.goals": {"loading_rate": 1e-3}, "transcription": "multiple-shooting"}
+    with pytest.raises(ConfigError, match=r"loading_rate.*collocation alone"):
+        with_values(load_config("mapd-barefoot"), changes)
 
 
 def test_ranges_are_of_coordinates_that_are_angles() -> None:

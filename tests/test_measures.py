@@ -36,7 +36,7 @@ from pathwalker_cli.studies.sensitivity.result import (
     sensitivity_lines,
 )
 from pathwalker_cli.studies.tradeoff import result as tradeoff
-from pathwalker_cli.studies.uncertainty.result import uncertainty_lines
+from pathwalker_cli.studies.uncertainty.text import uncertainty_lines
 from report_runs import write_made_run
 from test_report import made_landscape, made_tradeoff, made_uncertainty
 

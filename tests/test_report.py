@@ -26,13 +26,16 @@ from pathwalker_cli.evaluation.recorded import Spread
 from pathwalker_cli.inverse.study import load_inverse_dynamics
 from pathwalker_cli.patient import load_patient
 from pathwalker_cli.report import figures
-from pathwalker_cli.report.changes import Outcome
+from pathwalker_cli.report.answer import answer
+from pathwalker_cli.report.changes import Outcome, outcomes
 from pathwalker_cli.report.content import Drawing, Fact, Page, Row, Section, Table
+from pathwalker_cli.report.folders import Study
 from pathwalker_cli.report.gait_page import gait_page
 from pathwalker_cli.report.page import page_html, page_of
 from pathwalker_cli.report.pdf import page_pdf
 from pathwalker_cli.report.runs import read_runs
 from pathwalker_cli.report.springs import recommended, spring_section, verdict_words
+from pathwalker_cli.report.summaries import UncertaintySummary
 from pathwalker_cli.results.run_folder import write_run
 from pathwalker_cli.stride.figures.inline import inline_svg
 from pathwalker_cli.stride.figures.style import new_figure
@@ -43,8 +46,8 @@ from pathwalker_cli.studies.neighbours import Solved
 from pathwalker_cli.studies.tradeoff.result import FrontPoint, Tradeoff, front_of, judged
 from pathwalker_cli.studies.tradeoff.result import write_tables as write_tradeoff
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input
+from pathwalker_cli.studies.uncertainty.files import write_tables as write_uncertainty
 from pathwalker_cli.studies.uncertainty.result import Uncertainty
-from pathwalker_cli.studies.uncertainty.result import write_tables as write_uncertainty
 from pathwalker_cli.studies.verdict import StifferStops, StopVerdict, verdict_of_metrics
 from report_runs import HOSTILE, made_verdict, write_made_run
 
@@ -319,6 +322,37 @@ def test_springs_are_real_ones_in_both_units_with_range_and_verdict(runs: Path) 
     assert "exceeded by 2.9 deg" in facts["Hard stops"]
     assert "K_D left: it sits at the upper limit" in facts["Limits and doubts"]
     assert recommended(run)["plantarflexion_stiffness_left"] == 5.0
+
+
+@pytest.mark.usefixtures("no_curves")
+def test_springs_of_learnt_numbers_come_with_their_spread(runs: Path) -> None:
+    (found,) = read_runs([runs / "mapd-orthosis"])
+    config = found.run.config.model_copy(update={"learnt": load_config("predict-orthosis").learnt})
+    case = replace(found.run.case, config=config)
+    run = replace(found, run=replace(found.run, case=case))
+    alone = " ".join(gait_page([run]).answer)
+    assert (
+        "how far they spread was not examined: pathwalker uncertainty uncertainty-learnt" in alone
+    )
+    metrics = run.run.metrics
+    about = {key: metrics[key] for key in ("problem", "patient")}
+    spread = {"quantiles": {"0.05": 5.2, "0.5": 30.0, "0.95": 92.0}, "share_at_lower_limit": 0.0,
+              "share_at_upper_limit": 0.1, "strongest_input": None,
+              "rank_correlation": None}  # fmt: skip
+    content = about | {
+        "draws": 21, "failed": ["draw-00003"], "stiffness_ranges": {},
+        "base": {key: metrics[key] for key in ("cost", "walking_speed")},
+        "spreads": dict.fromkeys(STIFFNESSES, spread), "advice": ["K_D right: not determined"],
+        "measure_first": {"place": "tissue.damping", "share": 0.3, "chance": False},
+    }  # fmt: skip
+    study = Study(runs, "uncertainty", content, UncertaintySummary.model_validate(content))
+    said = " ".join(answer([run], outcomes([run]), [study]))
+    assert "Over 20 sets of numbers that explain the child's strides about as well, 90 %" in said
+    assert "(K_D) right 5 to 92, " in said
+    assert "Measuring tissue.damping would narrow K_D most." in said
+    assert "not examined" not in said
+    elsewhere = replace(study, content=content | {"base": {"cost": 9.0, "walking_speed": 1.0}})
+    assert answer([run], outcomes([run]), [elsewhere]) == gait_page([run]).answer
 
 
 def test_without_a_verdict_the_page_says_so(made_solution: MadeSolution, tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from pathwalker_cli.studies.base import Work, base_run, load_study
 from pathwalker_cli.studies.neighbours import Solved
 from pathwalker_cli.studies.uncertainty import UncertaintyStudy, draw_cases, uncertainty
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, Input, draw, inputs_of
+from pathwalker_cli.studies.uncertainty.files import uncertainty_content
 from pathwalker_cli.studies.uncertainty.result import (
     Spread,
     Uncertainty,
@@ -34,7 +35,6 @@ from pathwalker_cli.studies.uncertainty.result import (
     rank_correlations,
     span_text,
     span_words,
-    uncertainty_content,
 )
 
 pytestmark = pytest.mark.usefixtures("sketched")
@@ -386,6 +386,36 @@ def test_what_was_learnt_says_which_springs_it_leaves_open(k_d: np.ndarray, word
     (advice,) = uncertainty_content(result)["advice"]
     assert words in advice
     assert "cost." not in advice
+
+
+def test_the_one_measurement_is_what_both_springs_follow_most() -> None:
+    """K_D right follows a, K_D left b, both follow c and the cost d more than either."""
+    rng = np.random.default_rng(2)
+    places = ("tissue.damping", "tissue.hip_stiffness.right", "tissue.knee_stiffness.left",
+              "cost.goals.time")  # fmt: skip
+    a, b, c, d = drawn = rng.standard_normal((4, 60))
+    k_d = 50.0 + 2.0 * a + 3.0 * c + 9.0 * d, 50.0 + 2.0 * b + 3.0 * c + 9.0 * d
+    base = dict.fromkeys([measure.key for measure in measures_in("studies")], 1.0)
+    names = [name for name in STIFFNESSES if name.startswith("dorsiflexion")]
+    solved = tuple(
+        Solved(
+            f"draw-{i:05d}", "converged", {**base, names[0]: right, names[1]: left}, 9, 0.1, False
+        )
+        for i, (right, left) in enumerate(zip(*k_d, strict=True))
+    )
+    ranges = dict.fromkeys(STIFFNESSES, (1.0, 1.0)) | dict.fromkeys(names, (5.0, 92.0))
+    draws = Draws(tuple(map(Input, places)), drawn.T)
+    about = load_config("predict-orthosis"), "made", 42, base, ranges, measures_in("studies"), {}
+    content = uncertainty_content(Uncertainty(*about, draws, solved, 1.0, 1))
+    first = content["measure_first"]
+    assert first["place"] == "tissue.knee_stiffness.left"
+    ranked = [rank_correlations(drawn[2:3].T, k)[0] for k in k_d]
+    assert first["share"] == pytest.approx(np.mean(np.square(ranked)))
+    assert len(content["advice"]) == 3
+    assert "tissue.knee_stiffness.left would narrow K_D most" in content["advice"][-1]
+    prescribed = Uncertainty(*about[:4], dict.fromkeys(STIFFNESSES, (1.0, 1.0)), *about[5:],
+                             draws, solved, 1.0, 1)  # fmt: skip
+    assert uncertainty_content(prescribed)["measure_first"] is None
 
 
 def spread_of(values: np.ndarray) -> Spread:

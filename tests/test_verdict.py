@@ -60,6 +60,15 @@ def text(made: Verdict) -> dict[str, str]:
     return dict(verdict_lines(made))
 
 
+def test_a_verdict_on_learnt_numbers_names_what_tells_their_spread() -> None:
+    learnt = load_config("predict-orthosis").learnt
+    assert learnt is not None
+    said = dict(verdict_lines(verdict(), learnt, "runs/mine"))["learnt numbers"]
+    assert f"{len(learnt.numbers)} numbers learnt from barefoot strides" in said
+    assert said.endswith('uncertainty uncertainty-learnt --run runs/mine --set "set={}"')
+    assert "learnt numbers" not in text(verdict())
+
+
 @pytest.mark.parametrize(
     ("region", "words"),
     [((15.0, 30.0), "determined"), ((10.0, 60.0), "roughly determined"),

@@ -123,7 +123,7 @@ def _report(outcome: Outcome, folder: Path) -> None:
     click.echo()
     if verdict is not None:
         click.echo(f"How sure are the {'numbers' if verdict.numbers else 'springs'}?")
-        _echo([*verdict_lines(verdict)], width=20)
+        _echo([*verdict_lines(verdict, solution.config.learnt, folder)], width=20)
         click.echo()
     rows = [*optimum_lines(solution.optima), *detail_lines(solution, metrics)]
     rows += [("bounds", line) for line in source_lines(solution.bounds.sources)]

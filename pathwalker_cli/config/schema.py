@@ -23,6 +23,7 @@ from pathwalker_cli.installed import load_installed
 from pathwalker_cli.io.fields import AS_TUPLE, Quantity, Sides, Words, YamlModel, invalid
 from pathwalker_cli.model.choices import FRICTION
 from pathwalker_cli.model.contact import (
+    AS_RECORDED,
     HEEL_TOE,
     PHASE_NAMES,
     SHIPPED_USES,
@@ -98,17 +99,20 @@ TrialName = Annotated[str, BeforeValidator(lambda x: str(x) if type(x) is int el
 
 def _use(value: Any) -> Any:
     """Return how a foot is used from its name, or from what is on the ground in both supports."""
+    if value == _RECORDED:
+        return AS_RECORDED
     if isinstance(value, str):
         if value not in USES:
             load_installed()
         if value not in USES:
             mend = did_you_mean(value, USES) or "import what registers it first"
-            raise invalid(f"is '{value}'", allowed=", ".join(USES), mend=mend)
+            raise invalid(f"is '{value}'", allowed=", ".join((*USES, _RECORDED)), mend=mend)
         return USES[value]
     if not isinstance(value, dict):
         return value
     if set(value) != {"single", "landing"}:
-        raise invalid("is no use of a foot", allowed=f"{', '.join(USES)}, or {_POSTURES}")
+        known = ", ".join((*USES, _RECORDED))
+        raise invalid("is no use of a foot", allowed=f"{known}, or {_POSTURES}")
     supports = [value[name] for name in ("single", "landing")]
     for support in supports:
         if not isinstance(support, list | tuple) or not set(support) <= set(get_args(Posture)):
@@ -119,11 +123,13 @@ def _use(value: Any) -> Any:
     return use
 
 
-def _plain_use(use: Use) -> Any:
+def plain_use(use: Use) -> Any:
     """Return a use by the name that comes with this package, else in full: to be read anywhere."""
-    return use.name or asdict(use)
+    return _RECORDED if use == AS_RECORDED else use.name or asdict(use)
 
 
+_RECORDED: Final = "recorded"
+"""What a config calls the use that recordings show."""
 _POSTURES: Final = (
     "{single: [...], landing: [...]} of heel, flat and toe, "
     "e.g. {single: [flat, toe], landing: [toe, flat]}"
@@ -131,8 +137,11 @@ _POSTURES: Final = (
 FootUse = Annotated[
     Use,
     BeforeValidator(_use),
-    PlainSerializer(_plain_use),
-    Words("text or block of single, landing", ", ".join(f"`{name}`" for name in SHIPPED_USES)),
+    PlainSerializer(plain_use),
+    Words(
+        "text or block of single, landing",
+        ", ".join(f"`{name}`" for name in (*SHIPPED_USES, _RECORDED)),
+    ),
 ]
 
 
@@ -155,7 +164,7 @@ class ModelConfig(YamlModel):
 
     @property
     def pattern(self) -> ContactPattern:
-        """The phases of a stride."""
+        """The phases of a stride; as a case has them, which knows what recordings show."""
         return contact_pattern(self.feet, self.uses, self.toes)
 
     @model_validator(mode="after")
@@ -361,17 +370,8 @@ class StudyConfig(YamlModel):
 
     @model_validator(mode="after")
     def _suits_the_feet(self) -> StudyConfig:
-        given, names = self.mesh.intervals, self.model.pattern.names
-        if isinstance(given, tuple) and len(given) != len(names):
-            raise invalid(
-                f"has {len(given)} entries in mesh.intervals",
-                allowed=f"one number, or one per phase: {len(names)} ({', '.join(names)})",
-            )
-        if strangers := sorted(self.bounds.phase_durations.keys() - set(names)):
-            raise invalid(
-                f"bounds the phase {strangers[0]}, which these feet do not have",
-                allowed=", ".join(names),
-            )
+        if AS_RECORDED not in self.model.uses:
+            self._suits_the_phases()
         if self.model.feet in SOLES and self.cost.goals.get("centre_of_pressure"):
             raise invalid(
                 "weighs the goal 'centre_of_pressure', which needs heel and toe: a sole rolls",
@@ -404,6 +404,19 @@ class StudyConfig(YamlModel):
                     mend="set transcription to collocation, or model.feet to sole",
                 )
         return self
+
+    def _suits_the_phases(self) -> None:
+        given, names = self.mesh.intervals, self.model.pattern.names
+        if isinstance(given, tuple) and len(given) != len(names):
+            raise invalid(
+                f"has {len(given)} entries in mesh.intervals",
+                allowed=f"one number, or one per phase: {len(names)} ({', '.join(names)})",
+            )
+        if strangers := sorted(self.bounds.phase_durations.keys() - set(names)):
+            raise invalid(
+                f"bounds the phase {strangers[0]}, which these feet do not have",
+                allowed=", ".join(names),
+            )
 
     @model_validator(mode="after")
     def _bounds_of_joints(self) -> StudyConfig:
@@ -443,11 +456,19 @@ class StudyConfig(YamlModel):
                 f"asks for the goal '{names[0]}', but {self.problem} follows a recording",
                 mend="leave cost.goals out",
             )
-        whole = [name for name in names if name in GOALS and GOALS[name].whole_stride]
+        known = {name: GOALS[name] for name in names if name in GOALS}
+        whole = [name for name, goal in known.items() if goal.whole_stride]
         if self.half_cycle and whole:
             raise invalid(
                 f"asks half a cycle for the goal '{whole[0]}': it is symmetric already",
                 mend="leave the goal out, or set half_cycle to false",
+            )
+        smooth = [name for name, goal in known.items() if goal.collocation]
+        if self.transcription != "collocation" and smooth:
+            raise invalid(
+                f"asks {self.transcription} for the goal '{smooth[0]}', which needs the rates of "
+                "forces: collocation alone knows them",
+                mend="leave the goal out, or set transcription to collocation",
             )
         return self
 

@@ -12,7 +12,12 @@ from pathwalker_cli.gait.costs import BASE, GOALS, Costs, Instant, Totals, Weigh
 from pathwalker_cli.model.contact import phase_named
 from pathwalker_cli.model.elements.muscle import excitation_from_rate
 from pathwalker_cli.model.walker import Walker
-from pathwalker_cli.ocp.phased import PhasedMotion, PhaseMotion, quadrature_weights
+from pathwalker_cli.ocp.phased import (
+    PhasedMotion,
+    PhaseMotion,
+    lagrange_weights,
+    quadrature_weights,
+)
 from pathwalker_cli.ocp.problem import Sample
 
 
@@ -101,10 +106,13 @@ def _goal_gains(phase: PhaseMotion, costs: Costs, walker: Walker) -> np.ndarray:
     elements = walker.element_forces(*(x.reshape(-1, x.shape[-1]) for x in (q, v, activation)))
     loads = walker.cuff_forces(q.reshape(-1, n), v.reshape(-1, n), elements)
     cuffs = loads.reshape(*shape, -1)
+    steps, (times, weights) = phase.duration * np.diff(phase.mesh), quadrature_weights(phase.degree)
+    changes = np.einsum("jk,ik...->ij...", lagrange_weights(times, times, derivative=True), force)
+    force_rate = changes / steps[:, None, None]
     columns = q, v, activation, force, rate, excitation, vdot, reserve, q, heights, speeds, cuffs
-    moved = (list(np.moveaxis(values, -1, 0)) for values in columns)
-    point = Instant(contact, *moved, coordinates=walker.skeleton.coordinates)
+    *moved, slopes = (list(np.moveaxis(values, -1, 0)) for values in (*columns, force_rate))
+    names = walker.skeleton.coordinates
+    point = Instant(contact, *moved, force_rate=slopes, coordinates=names)
     running = costs.integrands(point, list(costs.numbers(walker)), costs.goals)
     values = np.array([np.broadcast_to(cost, shape) for cost in running])
-    steps, weights = phase.duration * np.diff(phase.mesh), quadrature_weights(phase.degree)[1]
     return np.asarray(np.einsum("kij,i,j->ik", values.reshape(-1, *shape), steps, weights))

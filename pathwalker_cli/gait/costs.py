@@ -39,6 +39,7 @@ class Instant:
         v: Generalised velocities, 10 entries [m/s, rad/s].
         activation: Activations, 14 entries.
         force: Contact forces of the phase in the order of `phase.forces` [N].
+        force_rate: Their rates of change [N/s]; only collocation knows them.
         rate: Activation rates, 14 entries [1/s].
         excitation: Excitations, 14 entries.
         vdot: Generalised accelerations, 10 entries [m/s^2, rad/s^2].
@@ -58,6 +59,7 @@ class Instant:
     v: Sequence[Any]
     activation: Sequence[Any]
     force: Sequence[Any]
+    force_rate: Sequence[Any] = field(default=(), kw_only=True)
     rate: Sequence[Any] = ()
     excitation: Sequence[Any] = ()
     vdot: Sequence[Any] = ()
@@ -78,11 +80,7 @@ class Instant:
         """
         if not self.phase.compliant:
             return {SUFFIX[side]: float(side in self.phase.feet) for side in SIDES}
-        pairs = zip(self.phase.forces, self.force, strict=True)
-        loads: dict[str, Any] = {}
-        for f, value in pairs:
-            if f.bears:
-                loads[SUFFIX[f.point.side]] = loads.get(SUFFIX[f.point.side], 0.0) + value
+        loads = self.by_foot(self.force)
         return {side: load**2 / (load**2 + LOADED**2) for side, load in loads.items()}
 
     @property
@@ -96,6 +94,14 @@ class Instant:
         """Accelerations but for those of what turns beside a joint of the body."""
         pairs = zip(self.coordinates, self.vdot, strict=False)
         return tuple(value for name, value in pairs if name not in _BESIDE)
+
+    def by_foot(self, values: Sequence[Any]) -> dict[str, Any]:
+        """Return the sums of vertical components of each foot on the ground by its suffix."""
+        sums: dict[str, Any] = {}
+        for f, value in zip(self.phase.forces, values, strict=True):
+            if f.bears:
+                sums[SUFFIX[f.point.side]] = sums.get(SUFFIX[f.point.side], 0.0) + value
+        return sums
 
     def angle(self, name: str) -> Any:
         """Return a coordinate by its name."""
@@ -133,6 +139,7 @@ class CostTerm:
         unit: Unit of the value.
         size: How many numbers it takes, see `Instant.data`.
         whole_stride: Whether it makes no sense for half a cycle of a symmetric gait.
+        collocation: Whether it needs what collocation alone knows, the rates of forces.
         per_distance: Whether the value is still to be divided by the distance.
         result: Its name among the cost terms of a result; "" for what only helps a start.
     """
@@ -144,6 +151,7 @@ class CostTerm:
     unit: str
     size: int = 0
     whole_stride: bool = False
+    collocation: bool = False
     per_distance: bool = False
     result: str = ""
 
@@ -304,6 +312,11 @@ def _stumbling(point: Instant) -> tuple[Any, ...]:
     return (sum(near, 0.0 * point.q[0]),)
 
 
+def _loading_rate(point: Instant) -> tuple[Any, ...]:
+    rates = point.by_foot(point.force_rate).values()
+    return (sum((rate / point.data[0]) ** 2 for rate in rates),)
+
+
 def _cuff_load(point: Instant) -> tuple[Any, ...]:
     (weight,) = point.data
     return (sum(((force / weight) ** 2 for force in point.cuffs), 0.0 * point.q[0]),)
@@ -338,6 +351,12 @@ GOALS: Final[dict[str, CostTerm]] = {
         "swing the feet clear of the ground: squared forward speed of places in the air, a quarter "
         "of it at 1.5 cm of height and hardly any above 4, per distance",
         ("stumbling",), _stumbling, _of("stumbling"), "m/s", per_distance=True,
+    ),
+    "loading_rate": CostTerm(
+        "load and unload the feet gently: squared rates of the vertical force on each foot in body "
+        "weights per second, per distance",
+        ("loading_rate",), _loading_rate, _of("loading_rate"), "1/(s m)", size=1,
+        per_distance=True, collocation=True,
     ),
     "cuff_load": CostTerm(
         "spare the leg under the cuff: squared forces of the orthoses' cuffs in body weights, per "
@@ -432,6 +451,7 @@ class Costs:
         known = {
             "upright_trunk": [self.trunk_lean],
             "centre_of_pressure": [walker.weight],
+            "loading_rate": [walker.weight],
             "cuff_load": [walker.weight],
             "discomfort": np.array(ranges).T.ravel(),
         }

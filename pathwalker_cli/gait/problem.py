@@ -247,7 +247,7 @@ class GaitProblem:
             path=self._path(contact, force, position),
             end=self._touch_down(contact.touched_down(following), position, velocity, acceleration),
             fixed_at_end=self._fixed_at_end(contact, following),
-            integrands=self._integrands(contact, vdot, force, reserve, position, velocity),
+            integrands=self._integrands(contact, z, position, velocity),
             frozen=frozen,
         )
 
@@ -275,19 +275,21 @@ class GaitProblem:
     def _integrands(
         self,
         contact: ContactPhase,
-        vdot: ca.SX,
-        force: ca.SX,
-        reserve: ca.SX,
+        z: Variables,
         position: ca.SX,
         velocity: ca.SX,
     ) -> ca.SX:
-        a, rate = self.activations.symbol, self.rates.symbol
+        a, rate, size = self.activations.symbol, self.rates.symbol, self.walker.skeleton.size
+        parts = [0, size, size + len(contact.forces), z.size]
+        vdot, force, reserve = ca.vertsplit(z.symbol, parts)
+        _, force_rate, _ = ca.vertsplit(z.rate, parts)
         columns = (self.q, self.v, a, force, rate, excitation_from_rate(rate, a), vdot, reserve)
         air = self.pattern.in_the_air(contact)
         heights, speeds = position[[2 * i + 1 for i in air]], velocity[[2 * i for i in air]]
-        known = *columns, self.reference, heights, speeds, self._cuffs()
-        split = (ca.vertsplit(x) if x.numel() else [] for x in known)
-        point = Instant(contact, *split, coordinates=self.walker.skeleton.coordinates)
+        known = *columns, self.reference, heights, speeds, self._cuffs(), force_rate
+        *split, slopes = (ca.vertsplit(x) if x.numel() else [] for x in known)
+        names = self.walker.skeleton.coordinates
+        point = Instant(contact, *split, force_rate=slopes, coordinates=names)
         numbers = ca.vertsplit(self.constants.cost_numbers)
         return ca.vertcat(*self.costs.integrands(point, numbers))
 

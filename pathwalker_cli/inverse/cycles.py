@@ -11,7 +11,7 @@ import numpy as np
 
 from pathwalker_cli.conventions import ANGLES, SIDES, Side
 from pathwalker_cli.errors import DataError
-from pathwalker_cli.io.c3d_events import Event, EventKind
+from pathwalker_cli.io.c3d_events import Event, frames_of
 from pathwalker_cli.trajectory import Trajectory
 
 OTHER: Final[Mapping[Side, Side]] = {"right": "left", "left": "right"}
@@ -55,23 +55,12 @@ class GaitCycle:
         return slice(self.start, self.end + 1)
 
 
-def _frames(events: Sequence[Event], side: Side, *kinds: EventKind) -> tuple[tuple[int, ...], ...]:
-    """Return the frames of a side's events wherever they follow one another in these kinds."""
-    own = [event for event in events if event.side == side]
-    runs = zip(*(own[first:] for first in range(len(kinds))), strict=False)
-    return tuple(
-        tuple(event.frame for event in run)
-        for run in runs
-        if tuple(event.kind for event in run) == kinds
-    )
-
-
 def stances(events: Sequence[Event]) -> tuple[Stance, ...]:
     """Return the stances that the recording shows from strike to toe-off, in order of time."""
     every = [
         Stance(side, *frames)
         for side in SIDES
-        for frames in _frames(events, side, "foot_strike", "toe_off")
+        for frames in frames_of(events, side, "foot_strike", "toe_off")
     ]
     return tuple(sorted(every, key=lambda stance: stance.strike))
 
@@ -81,14 +70,14 @@ def gait_cycles(events: Sequence[Event]) -> tuple[GaitCycle, ...]:
     every = [
         GaitCycle(side, *frames)
         for side in SIDES
-        for frames in _frames(events, side, "foot_strike", "toe_off", "foot_strike")
+        for frames in frames_of(events, side, "foot_strike", "toe_off", "foot_strike")
     ]
     return tuple(sorted(every, key=lambda cycle: cycle.start))
 
 
 def swings(events: Sequence[Event], side: Side) -> tuple[tuple[int, ...], ...]:
     """Return toe-off and next strike of a foot's swings that the recording shows in full."""
-    return _frames(events, side, "toe_off", "foot_strike")
+    return frames_of(events, side, "toe_off", "foot_strike")
 
 
 def single_support(stance: Stance, events: Sequence[Event]) -> np.ndarray:

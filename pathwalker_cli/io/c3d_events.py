@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
@@ -42,6 +42,19 @@ class Event:
     side: Side
     kind: EventKind
     frame: int
+
+
+def frames_of(
+    events: Sequence[Event], side: Side, *kinds: EventKind
+) -> tuple[tuple[int, ...], ...]:
+    """Return the frames of a side's events wherever they follow one another in these kinds."""
+    own = [event for event in events if event.side == side]
+    runs = zip(*(own[first:] for first in range(len(kinds))), strict=False)
+    return tuple(
+        tuple(event.frame for event in run)
+        for run in runs
+        if tuple(event.kind for event in run) == kinds
+    )
 
 
 def continued(group: Mapping[str, Any], name: str) -> list[Any]:

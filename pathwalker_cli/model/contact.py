@@ -86,6 +86,9 @@ the toe alone, and what was registered, see `extensions`."""
 SHIPPED_USES: Final = tuple(USES)
 """Names of those that come with this package."""
 
+AS_RECORDED: Final = Use((), ())
+"""The use that a child's recordings show, before they are read: see `model.landing`."""
+
 Contact = tuple[Use, Use]
 """Use of the right and the left foot."""
 

@@ -82,6 +82,7 @@ class CollocationBlocks:
         y = y0.value + duration * fraction * at * (u0.value + at / 2 * rise)
         u = u0.value + at * rise
         values = [x.value, z.value, y, u, p.value, problem.shared, problem.point_data]
+        values.append(ca.SX.nan(z.value.numel()))  # rows do not know the rate of z
         (result,), frozen = problem.substituted(phase, [rows.value / rows.scale], values)
         unknowns = [duration, *(k.scaled for k in (p, x, z, y0, u0, u1))]
         data = ca.vertcat(fraction, at, problem.point_data)
@@ -103,6 +104,7 @@ class CollocationBlocks:
         times, weights = quadrature_weights(d)
         nodes = np.concatenate([[0.0], collocation_times(d)])
         differentiation = lagrange_weights(nodes, nodes[1:], derivative=True)
+        among_points = lagrange_weights(times, times, derivative=True)
         duration, fraction = ca.SX.sym("T"), ca.SX.sym("fraction")
         step = duration * fraction
         p, x0, _ = self._unknowns(phase, "0")
@@ -115,7 +117,9 @@ class CollocationBlocks:
         for k, (x, z) in enumerate(points):
             y = y0.value + step * times[k] * (u0.value + times[k] / 2 * rise)
             values = [x.value, z.value, y, u0.value + times[k] * rise, p.value]
-            values += [problem.shared, data[k]]
+            changes = zip(among_points[k], points, strict=True)
+            z_rate = sum(w * other.value for w, (_, other) in changes) / step
+            values += [problem.shared, data[k], z_rate]
             expressions = [phase.derivative, phase.integrands]
             (derivative, integrands), more = problem.substituted(phase, expressions, values, str(k))
             slope = differentiation[k, 0] * x0.scaled

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -50,6 +51,11 @@ class Variables:
     def size(self) -> int:
         """Number of unknowns."""
         return len(self.names)
+
+    @cached_property
+    def rate(self) -> ca.SX:
+        """Symbols of their rates of change, which running costs alone may know."""
+        return ca.SX.sym("rate", self.size)
 
 
 @dataclass(frozen=True)
@@ -176,7 +182,10 @@ class MultiPhaseProblem:
     sample: ca.SX = field(default_factory=lambda: ca.SX(0))
 
     def inputs(self, phase: Phase) -> list[ca.SX]:
-        """Return the symbols x, z, y, u, p, shared, point data in the expressions of a phase."""
+        """Return the symbols in the expressions of a phase.
+
+        They are x, z, y, u, p, shared, point data, dz/dt; only running costs know the last.
+        """
         return [
             self.states.symbol,
             phase.algebraic.symbol,
@@ -185,6 +194,7 @@ class MultiPhaseProblem:
             self.parameters.symbol,
             self.shared,
             self.point_data,
+            phase.algebraic.rate,
         ]
 
     def substituted(

@@ -36,10 +36,10 @@ class ShootingProblem:
     """A problem whose smooth states are driven through an equation of their own.
 
     Args:
-        problem: The structure; residuals are linear in the algebraic variables, and residuals and
-            path rows know neither controls nor point data.  Its controls u = dy/dt become g(e, y)
-            in the running costs and e in the boundary rows; its rows at nodes are left out, as
-            bounds on e and y take their place.
+        problem: The structure; residuals are linear in the algebraic variables, residuals and
+            path rows know neither controls nor point data, and running costs no rates of z.  Its
+            controls u = dy/dt become g(e, y) in the running costs and e in the boundary rows; its
+            rows at nodes are left out, as bounds on e and y take their place.
         controls: e, piecewise linear and continuous.
         rate: Returns dy/dt for (e, y, rounding): g itself for rounding 0; where g has a kink, a
             rounding > 0 makes it smooth.
@@ -110,7 +110,7 @@ class ShootingBlocks:
         x, y = Unknown.of(problem.states, "x"), Unknown.of(problem.smooth, "y")
         z = Unknown.of(self.shooting.algebraic(phase), "z")
         nothing = [ca.SX.zeros(problem.controls.size), p.value, problem.shared]
-        nothing.append(ca.SX.zeros(problem.point_data.numel()))
+        nothing += [ca.SX.zeros(problem.point_data.numel()), ca.SX.nan(phase.algebraic.size)]
         values = [x.value, self._padded(phase, z.value), y.value, *nothing]
         (result,), frozen = problem.substituted(phase, [rows.value / rows.scale], values)
         unknowns = ca.vertcat(p.scaled, x.scaled, y.scaled, z.scaled)
@@ -144,7 +144,8 @@ class ShootingBlocks:
             e = left.value + (begin + width * pair.times[k]) * (right.value - left.value)
             rate = self.shooting.rate(e, y[k].value, rounding)
             values = [x[k].value, self._padded(phase, z[k].value), y[k].value, rate, p.value]
-            f, cost = slope.call([*values, problem.shared, data[k]], True, False)
+            values += [problem.shared, data[k], ca.SX.nan(phase.algebraic.size)]
+            f, cost = slope.call(values, True, False)
             slopes.append((f, rate, cost))
         step = duration * share
         rows = []
@@ -171,11 +172,11 @@ class ShootingBlocks:
         """Return the function (x, y, p, shared) -> matrix, constant of r = matrix z + constant."""
         frozen, residual = phase.frozen, phase.residual.value
         symbols = self.problem.inputs(phase)
-        x, z, y, u, p, shared, data = symbols
+        x, z, y, u, p, shared, data, _ = symbols
         matrix = ca.jacobian(residual, self.shooting.algebraic(phase).symbol)
         outer = ca.Function("outer", [*symbols, frozen.symbol_vector], [matrix, residual])
         inner = ca.Function("meanings", symbols, [frozen.meaning_vector])
-        at_zero = [x, 0 * z, y, 0 * u, p, shared, 0 * data]
+        at_zero = [x, 0 * z, y, 0 * u, p, shared, 0 * data, 0 * z]
         meanings = inner.call(at_zero, True, False)
         outputs = outer.call([*at_zero, *meanings], True, False)
         return ca.Function("system", [x, y, p, shared], outputs)
@@ -187,12 +188,13 @@ class ShootingBlocks:
         rate = ca.Function("rate", [e, y_symbol], [self.shooting.rate(e, y_symbol, 0.0)])
         slope = ca.Function("slope", symbols, [phase.derivative, phase.integrands])
         sizes = [symbols[0].numel(), symbols[2].numel(), e.numel()]
-        sizes += [symbol.numel() for symbol in symbols[4:]]
+        sizes += [symbol.numel() for symbol in symbols[4:7]]
         inputs: list[Any] = [ca.MX.sym("input", size) for size in sizes]
         x, y, e, p, shared, data = inputs
         matrix, constant = self._linear_system(phase)(x, y, p, shared)
         z = -ca.solve(matrix, constant, "qr")
         y_rate = rate(e, y)
-        x_rate, cost = slope(x, self._padded(phase, z), y, y_rate, p, shared, data)
+        unknown = ca.DM.nan(phase.algebraic.size)
+        x_rate, cost = slope(x, self._padded(phase, z), y, y_rate, p, shared, data, unknown)
         outputs = [z, ca.vertcat(x_rate, y_rate, cost)]
         return ca.Function(f"{phase.name}_dynamics", inputs, outputs)

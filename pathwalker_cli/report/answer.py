@@ -15,7 +15,7 @@ from pathwalker_cli.report.springs import left_open, prescribed, recommended
 from pathwalker_cli.report.summaries import SensitivitySummary, UncertaintySummary
 from pathwalker_cli.results.text import interesting
 from pathwalker_cli.studies.sensitivity.result import SHOWN, label_of
-from pathwalker_cli.studies.verdict.words import stop_sentence
+from pathwalker_cli.studies.verdict.words import spread_command, stop_sentence
 
 _KINDS = {
     "dorsiflexion": "the spring against the shin leaning forward (K_D)",
@@ -27,7 +27,9 @@ _NUMBERS = 3
 """Numbers of the child that are named because the answer follows them most."""
 
 
-def answer(runs: Sequence[ReportRun], found: Sequence[Outcome]) -> tuple[str, ...]:
+def answer(
+    runs: Sequence[ReportRun], found: Sequence[Outcome], studies: Sequence[Study] = ()
+) -> tuple[str, ...]:
     """Return the answer in plain sentences: how the child walks, which springs, how sure."""
     base = base_of(runs)
     sentences = [
@@ -36,7 +38,8 @@ def answer(runs: Sequence[ReportRun], found: Sequence[Outcome]) -> tuple[str, ..
         if i != base
     ]
     worn = [run for run in runs if run.worn]
-    sentences += [_springs(run, len(worn) > 1) for run in worn]
+    for run in worn:
+        sentences += [_springs(run, len(worn) > 1), *_spread(run, studies)]
     if not worn:
         sentences.append("No orthosis is worn, so nothing is said about springs.")
     end = _BEYOND if worn else "Compare it with the child before relying on it."
@@ -120,6 +123,41 @@ def _springs(run: ReportRun, several: bool) -> str:
         kinds = dict.fromkeys(_kind(name) for name in undecided)
         text += f"; for {' and '.join(kinds)}, any of the drawer: choose by fitting"
     return f"{text}."
+
+
+def _spread(run: ReportRun, studies: Sequence[Study]) -> Iterator[str]:
+    """Yield how far springs spread over other sets of learnt numbers, and what to measure first."""
+    learnt = run.run.config.learnt
+    free = [name for name in run.springs if not prescribed(run, name)]
+    if learnt is None or not free:
+        return
+    drawn = [
+        study.summary
+        for study in studies
+        if isinstance(study.summary, UncertaintySummary)
+        and study.summary.advice
+        and study.stands_on(run.run.metrics)
+    ]
+    if not drawn:
+        yield (
+            "Other numbers explain the child's strides about as well and may want other springs; "
+            f"how far they spread was not examined: {spread_command(run.run.folder)} tells."
+        )
+    for summary in drawn:
+        spans = (
+            f"{_kind(name)} {name.rpartition('_')[2]} "
+            f"{' to '.join(f'{end:.0f}' for end in summary.span(name))}"
+            for name in free
+        )
+        solved = summary.draws - len(summary.failed)
+        yield (
+            f"Over {solved} sets of numbers that explain the child's strides about as well, "
+            f"90 % give {', '.join(spans)} N m/rad."
+        )
+        first = summary.measure_first
+        if first is not None:
+            may = "may" if first.chance else "would"
+            yield f"Measuring {first.place} {may} narrow K_D most."
 
 
 def _kind(name: str) -> str:

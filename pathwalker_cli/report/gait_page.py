@@ -39,7 +39,7 @@ def gait_page(runs: Sequence[ReportRun], studies: Sequence[Study] = ()) -> Page:
         worn_words(run.braced) if run.label == "orthosis" else run.label for run in runs
     )
     title = f"Gait of {patient.id}: {named}"
-    return Page(title, facts, answer(runs, found), tuple(_warnings(runs)), tuple(sections))
+    return Page(title, facts, answer(runs, found, studies), tuple(_warnings(runs)), tuple(sections))
 
 
 def _mass(runs: Sequence[ReportRun]) -> str:

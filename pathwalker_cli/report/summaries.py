@@ -112,6 +112,12 @@ class _Spread(_Block):
     rank_correlation: Number
 
 
+class _First(_Block):
+    place: str
+    share: float
+    chance: bool
+
+
 class UncertaintySummary(Summary):
     """What `uncertainty` tells beside its table of draws."""
 
@@ -123,12 +129,18 @@ class UncertaintySummary(Summary):
     further: dict[str, str] = {}
     spreads: dict[str, _Spread]
     advice: list[str] = []
+    measure_first: _First | None = None
 
     @model_validator(mode="after")
     def _known_spreads(self) -> UncertaintySummary:
         for key in self.spreads.keys() - self.further.keys():
             _known(key)
         return self
+
+    def span(self, key: str) -> tuple[float, float]:
+        """Return the range of a measure without its tails [SI]."""
+        low, *_, high = (self.spreads[key].quantiles[str(q)] for q in QUANTILES)
+        return low, high
 
     @property
     def ranges(self) -> Ranges:

@@ -88,7 +88,7 @@ def run_study(
     solution = _solve(case, earlier, log)
     verdict = verdict_of(solution) if case.config.verdict else None
     lines = _log_lines(solution, inputs, log)
-    told = verdict_lines(verdict) if verdict else ()
+    told = verdict_lines(verdict, case.config.learnt, folder) if verdict else ()
     lines += [": ".join(filter(None, pair)) for pair in told]
     more = {"verdict": None if verdict is None else verdict.as_dict()}
     try:

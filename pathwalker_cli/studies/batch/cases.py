@@ -98,7 +98,7 @@ def _variants(study: BatchStudy, problem: str, base: Case, where: str) -> Iterat
             name = case_name(base.unvaried.id, problem, shown, label)
             changes = {**values, **flat(variant.set)}
             config = with_values(base.config, flat(changes), f"{where}, case {name}")
-            yield BatchCase(name, problem, replace(base, config=config), values, label)
+            yield BatchCase(name, problem, replace(base, config=config).landed, values, label)
 
 
 def _check_new(

@@ -125,9 +125,14 @@ class LearnResult:
         """Return the unit of a number."""
         if place.startswith(COST):
             goal = GOALS.get(place.rpartition(".")[2])
-            return "rad" if place == "cost.trunk_lean" else f"1/({goal.unit})" if goal else "m/s"
+            return "rad" if place == "cost.trunk_lean" else _inverse(goal.unit) if goal else "m/s"
         numbers = self.stride.walker.numbers
         return next((n.unit for n in numbers if place in (n.address, n.place)), "")
+
+
+def _inverse(unit: str) -> str:
+    """Return the unit of a weight of what has this unit, e.g. "s m" of "1/(s m)"."""
+    return unit[3:-1] if unit.startswith("1/(") else f"1/({unit})"
 
 
 def left_out_errors(

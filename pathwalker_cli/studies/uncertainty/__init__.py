@@ -27,13 +27,9 @@ from pathwalker_cli.studies.base import (
 from pathwalker_cli.studies.measures import free_units, measures, measures_with, ranges_of
 from pathwalker_cli.studies.neighbours import Solved, solve_all
 from pathwalker_cli.studies.uncertainty.draws import Distribution, Draws, draw, inputs_of
-from pathwalker_cli.studies.uncertainty.result import (
-    FILES,
-    Uncertainty,
-    uncertainty_content,
-    uncertainty_lines,
-    write_tables,
-)
+from pathwalker_cli.studies.uncertainty.files import FILES, uncertainty_content, write_tables
+from pathwalker_cli.studies.uncertainty.result import Uncertainty
+from pathwalker_cli.studies.uncertainty.text import uncertainty_lines
 
 DRAWS: Final = "draws"
 """Folder of the solved draws."""

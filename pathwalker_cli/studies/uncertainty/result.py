@@ -1,4 +1,4 @@
-"""How measures spread over draws of a patient: numbers, files, and a table for the terminal.
+"""How measures spread over draws of a patient: what was drawn, where it ended, and how it varies.
 
 References:
     Spearman (1904), The American Journal of Psychology 15, 72-101: rank correlation.
@@ -6,45 +6,29 @@ References:
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from scipy import stats
 
 from pathwalker_cli.config import StudyConfig
-from pathwalker_cli.config.learnt import COST
-from pathwalker_cli.io.csv_file import write_table
-from pathwalker_cli.io.json_file import write_json
 from pathwalker_cli.results.text import spring_ends
 from pathwalker_cli.stride.measure import Measure
-from pathwalker_cli.studies.measures import Ranges, range_content
+from pathwalker_cli.studies.measures import Ranges
 from pathwalker_cli.studies.neighbours import Solved
 from pathwalker_cli.studies.uncertainty.draws import Draws, Input
 
-FILES: Final = ("draws.csv", "uncertainty.csv", "correlations.csv", "uncertainty.json")
-
 _DIGITS: Final = {"N m/rad": 1, "deg": 1, "m": 3, "m/s": 3, "s": 3, "s/m": 3, "": 4}
 """Digits after the point by unit shown; of others three."""
-
-_LISTED: Final = 5
-"""Failed draws that the terminal lists one by one, and inputs of each."""
 
 QUANTILES: Final = (0.05, 0.5, 0.95)
 """What stands for the distribution of a measure: the middle, and the range of 90 % of draws."""
 
 ENOUGH: Final = 20
 """Draws from which on the range of 90 % of them leaves some out; of fewer, all are told."""
-
-_OPEN: Final = 0.25
-"""Share of the allowed range that draws must cover for a spring to count as not determined."""
-
-_HELD: Final = 0.5
-"""Share of draws at a limit from which on it is the limit that decides."""
 
 _CHANCE: Final = 0.05
 """Probability that among inputs without any effect the strongest one is named all the same."""
@@ -171,6 +155,11 @@ def span_text(spread: Spread, values: np.ndarray, limits: tuple[float, float] | 
     return f"{shown_text(spread.measure, low)} to {shown_text(spread.measure, high)}"
 
 
+def shown_text(measure: Measure, value: float) -> str:
+    """Return a value of a measure in the unit for people."""
+    return f"{measure.in_shown_unit(value):.{_DIGITS.get(measure.shown_unit, 3)}f}"
+
+
 def rank_correlations(inputs: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return Spearman's rank correlation of every input with a measure, shape (m,).
 
@@ -195,203 +184,3 @@ def _strongest(inputs: Sequence[Input], correlations: Iterable[float], draws: in
     sizes = [abs(c) if np.isfinite(c) else 0.0 for c in correlations]
     best = int(np.argmax(sizes))
     return inputs[best] if sizes[best] > chance_level(draws, len(inputs)) else None
-
-
-def write_tables(result: Uncertainty, folder: Path) -> None:
-    """Write `draws.csv`, `uncertainty.csv`, `correlations.csv` and `uncertainty.json`."""
-    _write_draws(result, folder / FILES[0])
-    header = ["measure", "unit", "base", "quantile 0.05", "median", "quantile 0.95", "draws [1]",
-              "share at lower limit [1]", "share at upper limit [1]", "strongest input",
-              "rank correlation [1]"]  # fmt: skip
-    rows = []
-    for spread in result.spreads:
-        numbers = [_number(value) for value in (spread.base, *spread.quantiles)]
-        rows.append([spread.measure.key, spread.measure.unit, *numbers, len(result.converged),
-                     spread.lower, spread.upper, spread.place, spread.strength])  # fmt: skip
-    write_table(folder / FILES[1], header, rows)
-    columns: list[list[Any]] = [["input", *(entry.place for entry in result.draws.inputs)]]
-    columns += [[f"{s.measure.key} [1]", *map(_number, s.correlations)] for s in result.spreads]
-    names, *lines = zip(*columns, strict=True)
-    write_table(folder / FILES[2], names, lines)
-    write_json(folder / FILES[3], uncertainty_content(result))
-
-
-def uncertainty_content(result: Uncertainty) -> dict[str, Any]:
-    """Return how everything spreads as plain values; SI units."""
-    return {
-        "problem": result.config.problem,
-        "patient": result.patient,
-        "tolerance": result.config.solver.tolerance,
-        "intervals": result.intervals,
-        "seconds": result.seconds,
-        "draws": len(result.solved),
-        "failed": [end.name for end in result.failed],
-        "base": result.base,
-        **range_content(result.ranges),
-        **({"further": result.further} if result.further else {}),
-        "spreads": {
-            spread.measure.key: {
-                "quantiles": dict(
-                    zip(map(str, QUANTILES), map(_number, spread.quantiles), strict=True)
-                ),
-                "share_at_lower_limit": spread.lower,
-                "share_at_upper_limit": spread.upper,
-                "strongest_input": spread.place or None,
-                "rank_correlation": spread.strength,
-            }
-            for spread in result.spreads
-        },
-        "advice": list(_advice(result)) if result.converged else [],
-    }
-
-
-def _write_draws(result: Uncertainty, path: Path) -> None:
-    """Write one row per draw: what was drawn, where it ended, and how to solve it again."""
-    header = ["draw", *(entry.heading for entry in result.draws.inputs), "status"]
-    header += [measure.column for measure in result.measures]
-    header += ["iterations", "seconds [s]", "variation"]
-    rows = []
-    for number, end in enumerate(result.solved):
-        variation = result.config.variation.merged(result.draws.variation(number))
-        text = json.dumps(variation.model_dump(mode="json"))
-        values = [end.values.get(m.key) for m in result.measures]
-        drawn = result.draws.values[number].tolist()
-        rows.append([number, *drawn, end.status, *values, end.iterations, end.seconds, text])
-    write_table(path, header, rows)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-def uncertainty_lines(result: Uncertainty) -> Iterator[str]:
-    """Yield the table of the terminal: medians, ranges, limits and the inputs that matter most."""
-    inputs, count, converged = len(result.draws.inputs), len(result.solved), len(result.converged)
-    yield (
-        f"{result.config.problem}, patient {result.patient}, {result.intervals} intervals: "
-        f"{count} draws of {inputs} inputs, {converged} converged"
-    )
-    if converged:
-        yield ""
-        yield _line("", "base", "median", span_words(converged), "follows most", "rank corr.")
-        yield from (_row(result, spread) for spread in result.spreads)
-        yield ""
-        yield from _limits(result)
-        yield from _advice(result)
-        level = chance_level(converged, inputs)
-        yield f"a correlation up to {level:.2f} may be chance among {inputs} inputs: none is named"
-    yield ""
-    yield from _failures(result)
-    yield _seconds(result)
-
-
-def _row(result: Uncertainty, spread: Spread) -> str:
-    measure = spread.measure
-    span = span_text(spread, result.values(measure.key), result.ranges.get(measure.key))
-    unit = f" [{measure.shown_unit}]" if measure.shown_unit else ""
-    middle = shown_text(measure, spread.quantiles[1])
-    strength = "" if spread.strength is None else f"{spread.strength:+.2f}"
-    base, label = shown_text(measure, spread.base), f"{measure.label}{unit}"
-    return _line(label, base, middle, span, spread.place or "-", strength)
-
-
-def shown_text(measure: Measure, value: float) -> str:
-    """Return a value of a measure in the unit for people."""
-    return f"{measure.in_shown_unit(value):.{_DIGITS.get(measure.shown_unit, 3)}f}"
-
-
-def _line(label: str, base: str, middle: str, span: str, place: str, strength: str) -> str:
-    return f"{label:<37}{base:>8}{middle:>9}{span:>18}  {place:<34}{strength:>10}".rstrip()
-
-
-def _limits(result: Uncertainty) -> Iterator[str]:
-    """Yield how often each spring and further number sits at a limit."""
-    for spread in result.spreads:
-        key, unit = spread.measure.key, spread.measure.unit
-        if spread.lower is None or spread.upper is None:
-            if key in result.ranges:
-                yield f"{spread.measure.label}: prescribed at {spread.base:.4g} {unit}"
-            continue
-        low, high = result.ranges[key]
-        yield (
-            f"{spread.measure.label}: at its lower limit of {low:g} {unit} in "
-            f"{100.0 * spread.lower:.0f} % of the draws, at its upper one of {high:g} in "
-            f"{100.0 * spread.upper:.0f} %"
-        )
-    if not any(low < high for low, high in result.ranges.values()):
-        yield "no spring is free"
-
-
-def _advice(result: Uncertainty) -> Iterator[str]:
-    """Yield, of learnt numbers, which springs they leave open, and what to measure first.
-
-    What walking costs cannot be measured; tissue, range of motion and strength can.
-    """
-    rows = [i for i, entry in enumerate(result.draws.inputs)
-            if entry.distribution is None and not entry.place.startswith(COST)]  # fmt: skip
-    level = chance_level(len(result.converged), len(result.draws.inputs))
-    most = "90 %" if len(result.converged) >= ENOUGH else "nearly all"
-    for spread in result.spreads:
-        low, high = result.ranges.get(spread.measure.key, (0.0, 0.0))
-        if not rows or not low < high:
-            continue
-        label, unit = spread.measure.label, spread.measure.unit
-        share = (spread.quantiles[2] - spread.quantiles[0]) / (high - low)
-        held = max(spread.lower or 0.0, spread.upper or 0.0) > _HELD
-        found = "held by its limit, not determined" if held else "determined"
-        text = (
-            f"{label}: {'not determined' if share > _OPEN else found} by what was learnt, "
-            f"{spread.quantiles[0]:.0f} to "
-            f"{spread.quantiles[2]:.0f} {unit} in {most} of the draws"
-        )
-        sizes = np.nan_to_num(np.abs(spread.correlations[rows]))
-        if sizes.any():
-            best = rows[int(np.argmax(sizes))]
-            chance = ", which may be chance" if sizes.max() <= level else ""
-            text += (
-                f"; what to measure first: {result.draws.inputs[best].place} (rank correlation "
-                f"{spread.correlations[best]:+.2f}{chance})"
-            )
-        yield text
-
-
-def _failures(result: Uncertainty) -> Iterator[str]:
-    if not result.failed:
-        return
-    share = 100.0 * len(result.failed) / len(result.solved)
-    yield (
-        f"{len(result.failed)} draws ({share:.0f} %) did not converge and are left out above; what "
-        f"was drawn for them stands in {FILES[0]}:"
-    )
-    numbers = {end.name: number for number, end in enumerate(result.solved)}
-    for end in result.failed[:_LISTED]:
-        yield f"  draw {numbers[end.name]}: {end.status}; {_extremes(result, numbers[end.name])}"
-    if len(result.failed) > _LISTED:
-        yield f"  and {len(result.failed) - _LISTED} more"
-
-
-def _extremes(result: Uncertainty, number: int) -> str:
-    """Return the inputs of a draw that are furthest from the middle of all draws."""
-    values = result.draws.values
-    spread = np.maximum(values.std(axis=0), np.finfo(float).tiny)
-    far = np.argsort(-np.abs(values[number] - np.median(values, axis=0)) / spread)[:_LISTED]
-    parts = []
-    for i in sorted(far):
-        entry, value = result.draws.inputs[i], values[number, i]
-        parts.append(f"{entry.place} {f'x {value:.3g}' if entry.relative else f'{value:+.3g}'}")
-    return ", ".join(parts)
-
-
-def _seconds(result: Uncertainty) -> str:
-    fresh = [end for end in result.solved if not end.kept]
-    kept = len(result.solved) - len(fresh)
-    there = f", {kept} were there already" if kept else ""
-    processes = "one process" if result.workers == 1 else f"{result.workers} processes"
-    text = f"{result.seconds:.0f} s in all, {processes}{there}"
-    if not fresh:
-        return text
-    seconds, iterations = [end.seconds for end in fresh], [end.iterations for end in fresh]
-    return (
-        f"{text}; per draw {np.median(seconds):.1f} s and {np.median(iterations):.0f} iterations "
-        f"at the median, {max(seconds):.1f} s and {max(iterations)} at most"
-    )

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from pathwalker_cli.config.learnt import Learnt
 from pathwalker_cli.conventions import STIFFNESSES, to_degrees
 from pathwalker_cli.results.text import angle_words
 from pathwalker_cli.stride.measures import measure_of
@@ -33,10 +35,20 @@ _LESS: Final = {"lower": ("less", -1.0), "upper": ("more", 1.0)}
 _TURNED: Final = {"lower": ("towards dorsiflexion", -1.0), "upper": ("towards plantarflexion", 1.0)}
 
 
-def verdict_lines(verdict: Verdict) -> Iterator[tuple[str, str]]:
-    """Yield label and text of every line."""
+def verdict_lines(
+    verdict: Verdict, learnt: Learnt | None = None, folder: str | Path = "RUN"
+) -> Iterator[tuple[str, str]]:
+    """Yield label and text of every line.
+
+    Args:
+        verdict: The verdict.
+        learnt: The learnt numbers that the run stands on.
+        folder: The run folder.
+    """
     for number in (*verdict.springs, *verdict.numbers):
         yield number.label, number_text(number)
+    if learnt is not None:
+        yield "learnt numbers", learnt_words(learnt, folder)
     reached = [stop for stop in verdict.stops if stop.excess > 0.0]
     yield "hard stops", "; ".join(map(stop_text, reached)) or "none is reached"
     for warning in stop_warnings(verdict):
@@ -47,6 +59,20 @@ def verdict_lines(verdict: Verdict) -> Iterator[tuple[str, str]]:
         yield "other optima", "not searched for: `starts: 8` looks from several starts"
     yield "real springs", _snapped(verdict)
     yield "verdict", f"{verdict.solves} problems solved around the optimum, {verdict.seconds:.1f} s"
+
+
+def learnt_words(learnt: Learnt, folder: str | Path) -> str:
+    """Return what a verdict on learnt numbers leaves out, and the command that tells it."""
+    return (
+        f"all of this is for {len(learnt.numbers)} numbers learnt from {learnt.condition} strides; "
+        "other sets explain the strides about as well and may want other springs. How far springs, "
+        f"speed and crouch spread over them, and what to measure first: {spread_command(folder)}"
+    )
+
+
+def spread_command(folder: str | Path) -> str:
+    """Return the command that draws other sets of learnt numbers around a run."""
+    return f'pathwalker uncertainty uncertainty-learnt --run {folder} --set "set={{}}"'
 
 
 def per_degree(stiffness: float) -> float:
