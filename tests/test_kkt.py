@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import pytest
 from scipy import sparse
@@ -9,7 +11,7 @@ from scipy import sparse
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import load_config, smoke_version, with_values
 from pathwalker_cli.gait.neighbourhood import Neighbourhood
-from pathwalker_cli.gait.resolve import Resolver, warm_start_for
+from pathwalker_cli.gait.resolve import Optimum, Resolver, warm_start_for
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp.ipopt import IpoptSettings, solve_program
 from pathwalker_cli.nlp.kkt import KktSystem
@@ -99,10 +101,27 @@ def test_derivatives_hold_where_inequalities_are_active() -> None:
     assert system.changed(system) == 0
 
 
+def optimum_in(book: Textbook, program: CollocationProgram) -> Optimum:
+    """Return the solution of a textbook problem in the program of other numbers."""
+    return Optimum(cast("GaitSolver", None), program, book.result)
+
+
+def test_the_way_to_a_neighbour_misses_its_rows_by_the_second_order() -> None:
+    book = Textbook()
+    here = optimum_in(book, book.solved)
+    plain, first = [], []
+    for distance in (1.02, 1.01):
+        there = optimum_in(book, book.program(distance))
+        plain.append(there.missed)
+        first.append(here.towards(there).missed)
+    assert plain[0] == pytest.approx(2.0 * plain[1], rel=0.1)
+    assert first[0] < 0.1 * plain[0]
+
+
 def test_a_warm_start_goes_further_off_its_bounds_the_more_it_misses() -> None:
     book = Textbook()
     barriers = [
-        warm_start_for(program, book.result.unknowns).barrier
+        warm_start_for(optimum_in(book, program)).barrier
         for program in (
             book.program(1.001),
             book.program(1.005),

@@ -8,7 +8,6 @@ from typing import Final
 
 from pathwalker_cli.errors import InputError
 from pathwalker_cli.explore.dials import Settings, case_at, dials_of, settings_of
-from pathwalker_cli.gait.neighbourhood import extrapolated
 from pathwalker_cli.gait.resolve import Optimum, Resolver
 from pathwalker_cli.nlp.watch import Observer
 from pathwalker_cli.results.run_folder import Run
@@ -54,7 +53,7 @@ class Session:
         if [v is None for v in before.values()] != [v is None for v in after.values()]:
             return None
         try:
-            return extrapolated(self.optimum, self._at(settings))
+            return self.optimum.towards(self._at(settings))
         except InputError:  # the end of what is allowed
             return None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -122,30 +122,7 @@ class Neighbourhood:
         self, answer: Answer, factor: float, step: float, ends: Mapping[int, Optimum]
     ) -> Derivative:
         below, above = (
-            _moved_by(self.optimum, answer, sign * step * factor, ends.get(sign, self.optimum))
+            self.optimum.moved(answer, sign * step * factor, ends.get(sign, self.optimum))
             for sign in (-1, 1)
         )
         return Derivative(answer.cost * factor, below, above, step)
-
-
-def extrapolated(optimum: Optimum, there: Optimum) -> Optimum:
-    """Return an optimum to first order where numbers of its problem have changed; none is solved.
-
-    Args:
-        optimum: The optimum.
-        there: The same unknowns in the program of the other numbers.
-    """
-    answer = optimum.kkt.towards(there.program, choices.WAY_SHARE)
-    return _moved_by(optimum, answer, 1.0, there)
-
-
-def _moved_by(optimum: Optimum, answer: Answer, amount: float, there: Optimum) -> Optimum:
-    """Return the optimum that an answer leads to, in the program of `there`."""
-    result, multipliers = optimum.result, optimum.result.multipliers
-    result = replace(
-        result,
-        unknowns=result.unknowns + amount * answer.unknowns,
-        objective=result.objective + amount * answer.cost,
-        multipliers=replace(multipliers, rows=multipliers.rows + amount * answer.rows),
-    )
-    return replace(there, result=result)

@@ -16,7 +16,7 @@ from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.model.numbers import Unknown
 from pathwalker_cli.model.walker import Walker
 from pathwalker_cli.nlp.ipopt import NlpSolver, last_barrier, warm_pushes
-from pathwalker_cli.nlp.kkt import KktSystem
+from pathwalker_cli.nlp.kkt import Answer, KktSystem
 from pathwalker_cli.nlp.result import Multipliers, NlpResult
 from pathwalker_cli.nlp.watch import Observer
 from pathwalker_cli.ocp.collocation import CollocationProgram
@@ -117,6 +117,29 @@ class Optimum:
         """The KKT system at this optimum."""
         return KktSystem(self.program, self.result)
 
+    @cached_property
+    def missed(self) -> float:
+        """Root mean square violation of the rows [solver units]."""
+        program, unknowns = self.program, self.result.unknowns
+        (_, rows) = program.functions["nlp"](unknowns, program.parameters)
+        missed = _outside(np.asarray(rows).ravel(), *program.row_bounds)
+        return float(np.sqrt(np.mean(missed**2)))
+
+    def towards(self, there: Optimum) -> Optimum:
+        """Return this optimum to first order in the program of a neighbour; nothing is solved."""
+        return self.moved(self.kkt.towards(there.program, choices.WAY_SHARE), 1.0, there)
+
+    def moved(self, answer: Answer, amount: float, there: Optimum) -> Optimum:
+        """Return where so much of an answer leads to, in the program of `there`."""
+        result, multipliers = self.result, self.result.multipliers
+        result = replace(
+            result,
+            unknowns=result.unknowns + amount * answer.unknowns,
+            objective=result.objective + amount * answer.cost,
+            multipliers=replace(multipliers, rows=multipliers.rows + amount * answer.rows),
+        )
+        return replace(there, result=result)
+
     @property
     def solution(self) -> GaitSolution:
         """The same as the end of a solve, e.g. for a run folder."""
@@ -184,12 +207,15 @@ class Resolver:
                 lead to a solution.
         """
         start = start or self.optimum
-        return self.solved(self.restored(case, start.result), insist)
+        guess = self.restored(case, start.result)
+        if guess.missed > choices.FURTHER_ROWS:
+            guess = min(guess, start.towards(guess), key=lambda each: each.missed)
+        return self.solved(guess, insist)
 
     def solved(self, guess: Optimum, insist: bool = True) -> Optimum:
         """Solve the problem of a neighbour from the unknowns and multipliers that it has."""
         program, start = guess.program, guess.result.unknowns
-        warm = self._warm(warm_start_for(program, start))
+        warm = self._warm(warm_start_for(guess))
         result = warm.solve(program, start, guess.result.multipliers)
         if insist and not result.converged and result.status != "stopped by the user":
             result = self._cold.solve(program, start)
@@ -223,15 +249,13 @@ class Resolver:
         return NlpSolver(self._program, settings, self._observer)
 
 
-def warm_start_for(program: CollocationProgram, start: np.ndarray) -> WarmStart:
-    """Return how to begin with this start: by how much it misses rows and bounds."""
-    (_, rows) = program.functions["nlp"](start, program.parameters)
-    missed = _outside(np.asarray(rows).ravel(), *program.row_bounds)
-    rms = float(np.sqrt(np.mean(missed**2)))
-    beyond = float(_outside(start, *program.bounds).max())
-    if rms > choices.FURTHER_ROWS:
+def warm_start_for(guess: Optimum) -> WarmStart:
+    """Return how to begin with this guess: by how much it misses rows and bounds."""
+    beyond = float(_outside(guess.result.unknowns, *guess.program.bounds).max())
+    if guess.missed > choices.FURTHER_ROWS:
         return _FAR
-    return _NEAR if rms < choices.NEAR_ROWS and beyond < choices.NEAR_BOUNDS else _FURTHER
+    near = guess.missed < choices.NEAR_ROWS and beyond < choices.NEAR_BOUNDS
+    return _NEAR if near else _FURTHER
 
 
 def _outside(values: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
