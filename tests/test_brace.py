@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -86,6 +87,8 @@ def test_hinges_stand_behind_the_ten_coordinates_of_recordings() -> None:
     assert {"shell_r", "shell_l"} <= skeleton.links
     assert tuple(braced().model.names)[1:] == skeleton.coordinates
     assert braced().as_recorded.skeleton == PLANAR_WALKER
+    again = pickle.loads(pickle.dumps(braced()))  # noqa: S301 - made just now
+    assert again.values == braced().values
     assert build_walker(PATIENT, "barefoot", orthosis="body").skeleton == PLANAR_WALKER
 
 
