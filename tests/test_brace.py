@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from pathwalker_cli.animation.viewer import walker_geometry
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import load_config, with_values
 from pathwalker_cli.conventions import SIDES, SUFFIX
-from pathwalker_cli.errors import ConfigError, InputError, PatientError
+from pathwalker_cli.errors import ConfigError, DataError, InputError, PatientError
 from pathwalker_cli.export.osim import osim_text
 from pathwalker_cli.gait import mesh
 from pathwalker_cli.gait.cost_terms import goal_values
@@ -86,6 +87,8 @@ def test_hinges_stand_behind_the_ten_coordinates_of_recordings() -> None:
     assert {"shell_r", "shell_l"} <= skeleton.links
     assert tuple(braced().model.names)[1:] == skeleton.coordinates
     assert braced().as_recorded.skeleton == PLANAR_WALKER
+    again = pickle.loads(pickle.dumps(braced()))  # noqa: S301 - made just now
+    assert again.values == braced().values
     assert build_walker(PATIENT, "barefoot", orthosis="body").skeleton == PLANAR_WALKER
 
 
@@ -492,6 +495,12 @@ def test_a_shell_wants_a_mass_and_opensim_knows_none() -> None:
         case.walker()
     with pytest.raises(InputError, match="cannot be written for OpenSim"):
         osim_text(braced())
+
+
+def test_a_walk_of_other_joints_is_no_start(series: GaitSeries) -> None:
+    solver = solver_of(**{"model.orthosis": "glued"})
+    with pytest.raises(DataError, match="moves 12 coordinates; allowed: a walk of the same 10"):
+        solver.solve(series.motion)
 
 
 @pytest.mark.slow

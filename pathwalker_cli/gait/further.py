@@ -92,11 +92,9 @@ def _lay_toes(walker: Walker, q: np.ndarray) -> None:
 def _rest_hinges(walker: Walker, q: np.ndarray) -> None:
     """Set the hinges of orthoses in postures (n, size) to where spring and cuff are in balance."""
     hinges = [joint for joint in walker.skeleton.joints if joint.beside]
-    names, columns = (
-        walker.skeleton.coordinates,
-        [walker.skeleton.index(j.coordinate) for j in hinges],
-    )
-    ankles = q[:, [walker.skeleton.index(joint.beside) for joint in hinges]]
+    names = walker.skeleton.coordinates
+    columns = [names.index(joint.coordinate) for joint in hinges]
+    ankles = q[:, [names.index(joint.beside) for joint in hinges]]
     low, high = ankles - _WIDEST, ankles + _WIDEST
     still, relaxed = np.zeros_like(q), [None] * len(walker.muscles)
     for _ in range(_HALVINGS if hinges else 0):

@@ -13,6 +13,7 @@ import numpy as np
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import StudyConfig
 from pathwalker_cli.conventions import COORDINATES
+from pathwalker_cli.errors import DataError
 from pathwalker_cli.gait import choices
 from pathwalker_cli.gait import mesh as meshing
 from pathwalker_cli.gait.bounds import (
@@ -295,8 +296,18 @@ class GaitSolver:
         return self.stride.name, (program, result)
 
     def _warm_motion(self, motion: PhasedMotion) -> PhasedMotion:
-        """Return an earlier motion as a start of this problem."""
-        mesh = self.config.mesh
+        """Return an earlier motion as a start of this problem.
+
+        Raises:
+            DataError: If it is one of other joints, as of shells on other sides.
+        """
+        mesh, size = self.config.mesh, self.walker.skeleton.size
+        if (found := motion.phases[0].states.shape[-1] // 2) != size:
+            raise DataError(
+                f"moves {found} coordinates",
+                where="--warm-start",
+                allowed=f"a walk of the same {size} joints",
+            )
         motion = replace(motion, phases=motion.phases[: len(self.gait.phases)])
         if not self.config.fits:
             motion = with_goal_costs(motion, self.gait.costs, self.walker)

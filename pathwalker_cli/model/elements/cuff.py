@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import casadi as ca
@@ -64,12 +64,22 @@ class Cuff(ForceElement, Protocol):
 
 def cuff_height(side: Side) -> Number:
     """Return how far above the ankle a cuff presses on the leg, as a number."""
-
-    def default(patient: Patient) -> float:
-        return patient.cuff_height(side)
-
     return Number(f"orthosis.cuff_height.{side}", "cuff_height", "height of the cuff", "m", side,
-                  default, "a share of the shank")  # fmt: skip
+                  partial(_height, side=side), "a share of the shank")  # fmt: skip
+
+
+def _height(patient: Patient, side: Side) -> float:
+    return patient.cuff_height(side)
+
+
+def _stiffness(patient: Patient, side: Side, share: float) -> float:
+    """Return the stiffness of tissue under a cuff [N/m], as a share of that across."""
+    thickness = CUFF_TISSUE * patient.length("shank", side)
+    return share * CUFF_MODULUS * patient.cuff_area(side) / thickness
+
+
+def _damping(patient: Patient, spring: Number) -> float:
+    return CUFF_RELAXATION * spring.value_for(patient)
 
 
 @dataclass(frozen=True)
@@ -152,14 +162,10 @@ class YieldingCuff:
         """Height [m]; stiffness [N/m] and damping [N s/m] across and along; then the hinge [m]."""
         side = self.side
 
-        def across(patient: Patient) -> float:
-            thickness = CUFF_TISSUE * patient.length("shank", side)
-            return CUFF_MODULUS * patient.cuff_area(side) / thickness
-
         def stiffness(way: str, share: float) -> Number:
             return Number(f"orthosis.cuff_stiffness.{way}.{side}", f"cuff_stiffness_{way}",
                           f"stiffness of the cuff {way}", "N/m", side,
-                          lambda patient: share * across(patient),
+                          partial(_stiffness, side=side, share=share),
                           "soft tissue of lower limbs, Zheng and Mak (1999); its thickness is "
                           "assumed")  # fmt: skip
 
@@ -168,7 +174,7 @@ class YieldingCuff:
         def damping(way: str, spring: Number) -> Number:
             return Number(f"orthosis.cuff_damping.{way}.{side}", f"cuff_damping_{way}",
                           f"damping of the cuff {way}", "N s/m", side,
-                          lambda patient: CUFF_RELAXATION * spring.value_for(patient),
+                          partial(_damping, spring=spring),
                           "assumed: the shell does not swing on the leg")  # fmt: skip
 
         dampers = (damping(way, k) for (way, _), k in zip(_WAYS, springs, strict=True))

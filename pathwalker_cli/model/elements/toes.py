@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from pathwalker_cli.model.choices import TOE_DAMPING, TOE_STIFFNESS
@@ -20,6 +20,11 @@ from pathwalker_cli.model.skeleton import SIDES, SUFFIX, Side
 
 if TYPE_CHECKING:
     from pathwalker_cli.patient import Patient
+
+
+def _scaled(patient: Patient, adult: float) -> float:
+    """Return a number of an adult for a child of another size."""
+    return adult * size_beside_adults(patient)
 
 
 @dataclass(frozen=True)
@@ -41,13 +46,7 @@ class ToeJoint:
     @cached_property
     def numbers(self) -> tuple[Number, Number, Number]:
         """Stiffness [N m/rad], damping [N m s/rad] and the angle at rest [rad]."""
-
-        def stiffness(patient: Patient) -> float:
-            return TOE_STIFFNESS * size_beside_adults(patient)
-
-        def damping(patient: Patient) -> float:
-            return TOE_DAMPING * size_beside_adults(patient)
-
+        stiffness, damping = (partial(_scaled, adult=a) for a in (TOE_STIFFNESS, TOE_DAMPING))
         side, source = self.side, "Falisse et al. (2022), scaled by body mass times height"
         return (
             Number(f"toes.stiffness.{side}", "toe_stiffness", "stiffness of the toe joint",

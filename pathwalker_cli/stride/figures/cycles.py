@@ -141,7 +141,7 @@ def cuffs(series: GaitSeries, reference: Reference | None = None) -> Figure:
         _draw_side(panels[1], series, side, -100.0 * across / walker.weight)
         _draw_side(panels[2], series, side, 1000.0 * series.cuff_shift(side)[:, 1])
     titles = {"Ankle beyond the hinge": "dorsiflexion [deg]",
-              "Cuff on the shin +, calf -": "force [% body weight]",
+              "Cuff, shin +, calf -": "force [% body weight]",
               "Cuff up the leg": "pistoning [mm]"}  # fmt: skip
     _dress_cycles(panels, series, titles)
     return fig
