@@ -14,6 +14,7 @@ from pathwalker_cli.report.runs import ReportRun
 from pathwalker_cli.report.springs import left_open, prescribed, recommended
 from pathwalker_cli.report.summaries import SensitivitySummary, UncertaintySummary
 from pathwalker_cli.results.text import interesting
+from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.sensitivity.result import SHOWN, label_of
 from pathwalker_cli.studies.verdict.words import spread_command, stop_sentence
 
@@ -145,8 +146,7 @@ def _spread(run: ReportRun, studies: Sequence[Study]) -> Iterator[str]:
         )
     for summary in drawn:
         spans = (
-            f"{_kind(name)} {name.rpartition('_')[2]} "
-            f"{' to '.join(f'{end:.0f}' for end in summary.span(name))}"
+            f"{measure_of(name).label} {' to '.join(f'{end:.0f}' for end in summary.span(name))}"
             for name in free
         )
         solved = summary.draws - len(summary.failed)
@@ -157,7 +157,7 @@ def _spread(run: ReportRun, studies: Sequence[Study]) -> Iterator[str]:
         first = summary.measure_first
         if first is not None:
             may = "may" if first.chance else "would"
-            yield f"Measuring {first.place} {may} narrow K_D most."
+            yield f"The measurement that {may} narrow K_D most: {label_of(first.place)}."
 
 
 def _kind(name: str) -> str:
