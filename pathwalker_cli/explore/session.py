@@ -97,10 +97,12 @@ class Session:
         return end
 
     def save(self, folder: Path) -> Outcome:
-        """Write what is looked at as a run, its mesh refined to the accuracy of the config.
+        """Write what is looked at as a run, its mesh refined where the config asks for that.
 
         Raises:
             DataError: If the folder holds something else or cannot be written.
         """
-        case = self.optimum.case.with_values({"verdict": False})
-        return run_study(case, folder, replace(self.run, motion=self.optimum.motion))
+        shown = self.optimum
+        case, multipliers = shown.case.with_values({"verdict": False}), shown.result.multipliers
+        start = replace(self.run, case=case, motion=shown.motion, multipliers=multipliers)
+        return run_study(case, folder, start)

@@ -141,7 +141,9 @@ def _solve(case: Case, earlier: Run | None, log: RunLog) -> GaitSolution:
     if earlier is not None and earlier.multipliers is not None and _same_problem(earlier, case):
         resolver = Resolver(case, earlier.motion, earlier.multipliers)
         if resolver.begins_there and resolver.optimum.converged:
-            return replace(resolver.optimum.solution, start=SAME_RUN)
+            solution = resolver.optimum.solution
+            if solution.converged:  # on its mesh too
+                return replace(solution, start=SAME_RUN)
     # what few solves need is loaded where it is needed: the others begin 0.4 s sooner
     if case.config.transcription == "multiple-shooting":
         from pathwalker_cli.gait.shooting import solve_by_shooting
