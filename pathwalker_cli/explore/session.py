@@ -102,7 +102,7 @@ class Session:
         Raises:
             DataError: If the folder holds something else or cannot be written.
         """
-        shown = self.optimum
-        case, multipliers = shown.case.with_values({"verdict": False}), shown.result.multipliers
-        start = replace(self.run, case=case, motion=shown.motion, multipliers=multipliers)
-        return run_study(case, folder, start)
+        case = self.optimum.case.with_values({"verdict": False})
+        shown = replace(self.optimum.solution, case=case)
+        start = replace(self.run, motion=self.optimum.motion)
+        return run_study(case, folder, start, found=shown if shown.converged else None)
