@@ -220,6 +220,12 @@ def test_what_is_refused_is_said_and_what_is_shown_is_saved(
     again = load_run(tmp_path / "as-it-was")
     assert again.metrics["cost"] == pytest.approx(run.metrics["cost"], rel=1e-6)
     assert again.metrics["warm_start"] == str(run.folder)
+    line = answers(
+        run, tmp_path, move(1, settings), {"kind": "save", "number": 1, "name": "turned"}
+    )
+    saved = next(m for m in line.answers if m["kind"] == "saved")
+    assert saved["shown"] != pytest.approx(run.metrics["cost"], rel=1e-6)
+    assert saved["cost"] == pytest.approx(saved["shown"], rel=1e-9)
 
 
 def test_pictures_are_plain_and_finite(session: Session) -> None:

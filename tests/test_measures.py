@@ -118,7 +118,7 @@ def test_a_new_measure_stands_in_the_reference() -> None:
 def test_keys_differ_and_tables_name_measures_that_exist() -> None:
     keys = [measure.key for measure in REGISTRY]
     assert len(set(keys)) == len(keys)
-    for names in ([m.label for m in REGISTRY], [(m.section, m.row, m.side) for m in REGISTRY]):
+    for names in ([(m.label, m.unit) for m in REGISTRY], [(m.section, m.row) for m in REGISTRY]):
         assert len(set(names)) == len(names), "one name, one definition"
     assert {key for names in TABLES.values() for name in names for key in expanded(name)} <= {*keys}
     for table in TABLES:

@@ -96,10 +96,12 @@ class Session:
         return end
 
     def save(self, folder: Path) -> Outcome:
-        """Write what is looked at as a run, its mesh refined to the accuracy of the config.
+        """Write what is looked at as a run, its mesh refined where the config asks for that.
 
         Raises:
             DataError: If the folder holds something else or cannot be written.
         """
         case = self.optimum.case.with_values({"verdict": False})
-        return run_study(case, folder, replace(self.run, motion=self.optimum.motion))
+        shown = replace(self.optimum.solution, case=case)
+        start = replace(self.run, motion=self.optimum.motion)
+        return run_study(case, folder, start, found=shown if shown.converged else None)

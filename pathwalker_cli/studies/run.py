@@ -67,6 +67,7 @@ def run_study(
     folder: Path,
     warm_start: Path | Run | None = None,
     log: RunLog | None = None,
+    found: GaitSolution | None = None,
 ) -> Outcome:
     """Solve a study, judge its springs, and write its run folder.
 
@@ -75,6 +76,7 @@ def run_study(
         folder: The run folder; an earlier run in it is replaced.
         warm_start: An earlier run to begin with, or its folder.
         log: Hears every iteration.
+        found: The solution, if it is known already.
 
     Raises:
         DataError: If the folder holds something else, or the earlier run cannot be used; if the
@@ -85,7 +87,7 @@ def run_study(
     earlier = warm_start if isinstance(warm_start, Run | None) else (
         warm_start_run(warm_start, case.config))  # fmt: skip
     inputs = run_inputs(case, None if earlier is None else earlier.folder)
-    solution = _solve(case, earlier, log)
+    solution = found or _solve(case, earlier, log)
     verdict = verdict_of(solution) if case.config.verdict else None
     lines = _log_lines(solution, inputs, log)
     told = verdict_lines(verdict, case.config.learnt, folder) if verdict else ()
