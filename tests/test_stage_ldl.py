@@ -9,6 +9,7 @@ import pytest
 from scipy import sparse
 
 from pathwalker_cli.case import load_case
+from pathwalker_cli.gait.first_mesh import tracked
 from pathwalker_cli.gait.mesh import first
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp.kernels import kernels
@@ -124,7 +125,7 @@ def test_ipopt_finds_the_same_with_mumps(solver: GaitSolver) -> None:
     found = []
     for extra in ({}, {"linear_solver": "mumps"}):
         again = GaitSolver(solver.case.with_values({"solver.ipopt": {"max_iter": 1, **extra}}))
-        _, result = again._track()
+        _, result = tracked(again)
         found.append(result)
     ours, theirs = found
     assert ours.iterations == theirs.iterations

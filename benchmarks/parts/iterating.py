@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from pathwalker_cli.case import load_case
+from pathwalker_cli.gait.first_mesh import tracked
 from pathwalker_cli.gait.solve import GaitSolver
 from pathwalker_cli.nlp import blocks
 from pathwalker_cli.nlp.assembly import FUNCTIONS
@@ -60,8 +61,8 @@ def steps(
     mesh = (f"mesh.intervals={intervals}", "mesh.refinements=0")
     case = load_case(problem, changes=(*mesh, f"solver.max_iterations={tracking}"))
     solver, config = GaitSolver(case), case.config
-    tracked, result = solver._track()
-    motion = replace(tracked.to_motion(result.unknowns), parameters=solver.parameter_guess())
+    program, result = tracked(solver)
+    motion = replace(program.to_motion(result.unknowns), parameters=solver.parameter_guess())
     if variant == "casadi":
         blocks.kernels = lambda: None
     program = CollocationProgram(solver.blocks, solver.prediction, motion.meshes)
