@@ -626,7 +626,7 @@ def test_ctrl_c_keeps_the_last_iterate(tmp_path: Path) -> None:
     ) as process:
         assert process.stderr is not None
         for line in process.stderr:
-            if line.startswith("tracking"):
+            if line.startswith("first mesh"):
                 process.send_signal(signal.SIGINT)
                 break
         error = process.stderr.read()

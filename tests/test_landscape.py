@@ -356,7 +356,8 @@ def test_a_real_landscape(tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "out" / "landscape.json").read_text(encoding="utf-8"))
     assert summary["failed_points"] == []
     assert summary["grid_points"] == 9
-    assert summary["best"]["measures"]["cost"] <= summary["start"]["measures"]["cost"]
+    costs = (summary[name]["measures"]["cost"] for name in ("best", "start"))
+    assert next(costs) <= next(costs) * (1.0 + 1e-6), "to the tolerance of the solves"
     soft = [row for row in csv.DictReader((tmp_path / "out" / "landscape.csv").open())
             if row["point"] == "d1-p3"]  # fmt: skip
     assert float(soft[0]["cost_increase [1]"]) > 0.05, "soft against dorsiflexion costs effort"

@@ -35,6 +35,9 @@ _COLOURS: Final = "cividis_r"
 _LOGARITHMIC: Final = 5.0
 """Ratio of the ends of an axis from which on it is drawn logarithmically."""
 
+_MIDDLE: Final = (0.35, 0.65)
+"""Shares of a small axis between which a number stands clear of those at its ends."""
+
 _TITLE: Final = 22
 """Characters of the longest line of a small title."""
 
@@ -169,7 +172,11 @@ def _plane(ax: Axes, landscape: Landscape, small: bool = False) -> None:
     ):
         logarithmic = values[0] > 0.0 and values[-1] / values[0] >= _LOGARITHMIC
         set_scale("log" if logarithmic else "linear")
-        ticks = np.unique(values[[0, (values.size - 1) // 2, -1]]) if small else values
+        places = np.log(values) if logarithmic else values
+        shares = (places - places[0]) / (places[-1] - places[0])
+        # in a small panel there is room for one number between the ends
+        middle = values[(shares >= _MIDDLE[0]) & (shares <= _MIDDLE[1])][:1]
+        ticks = np.array([values[0], *middle, values[-1]]) if small else values
         axis.set_major_locator(FixedLocator(ticks.tolist()))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))
