@@ -66,14 +66,8 @@ def _stances(walker: Walker, side: Side) -> tuple[list[float], list[float]]:
             poses = recording.motion.values[strike:toe_off].copy()
             poses[:, :2] = 0.0  # where the pelvis is does not matter, and may not be known
             if np.isfinite(poses).all():
-                forward, up = np.array([_sole(walker, pose, side) for pose in poses]).T
+                points = walker.foot_points(poses)[:, 2 * SIDES.index(side) :]
+                forward, up = (points[:, 1] - points[:, 0]).T
                 strikes.append(float(np.arctan2(up[0], forward[0])))
                 lowest.append(float(-up.max()))
     return strikes, lowest
-
-
-def _sole(walker: Walker, pose: np.ndarray, side: Side) -> np.ndarray:
-    """Return the way from heel to toe of a foot, forward and up [m]."""
-    first = 2 * SIDES.index(side)
-    heel, toe = walker.foot_points(pose)[first : first + 2]
-    return np.asarray(toe - heel)
