@@ -105,7 +105,7 @@ def test_the_output_folder_is_looked_at(here: Path) -> None:
     ("name", "kind", "solves"),
     [
         ("perturbation", "perturbation", 4),
-        ("sensitivity", "sensitivity", 4),
+        ("sensitivity", "sensitivity", 6),
         ("uncertainty", "uncertainty", 100),
         ("landscape", "landscape", 68),
         ("tradeoff", "tradeoff", 10),
