@@ -350,6 +350,8 @@ def test_springs_of_learnt_numbers_come_with_their_spread(runs: Path) -> None:
     assert "Over 20 sets of numbers that explain the child's strides about as well, 90 %" in said
     assert "90 % give K_D right 5 to 92, K_D left 5 to 92, " in said
     assert "The measurement that would narrow K_D most: tissue, damping." in said
+    few = Study(runs, "uncertainty", content, UncertaintySummary(**content | {"draws": 9}))
+    assert "nearly all give K_D right 5 to 92, " in " ".join(answer([run], outcomes([run]), [few]))
     assert "not examined" not in said
     elsewhere = replace(study, content=content | {"base": {"cost": 9.0, "walking_speed": 1.0}})
     assert answer([run], outcomes([run]), [elsewhere]) == gait_page([run]).answer

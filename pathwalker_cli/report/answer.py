@@ -16,6 +16,7 @@ from pathwalker_cli.report.summaries import SensitivitySummary, UncertaintySumma
 from pathwalker_cli.results.text import interesting
 from pathwalker_cli.stride.measures import measure_of
 from pathwalker_cli.studies.sensitivity.result import SHOWN, label_of
+from pathwalker_cli.studies.uncertainty.result import most
 from pathwalker_cli.studies.verdict.words import spread_command, stop_sentence
 
 _KINDS = {
@@ -152,7 +153,7 @@ def _spread(run: ReportRun, studies: Sequence[Study]) -> Iterator[str]:
         solved = summary.draws - len(summary.failed)
         yield (
             f"Over {solved} sets of numbers that explain the child's strides about as well, "
-            f"90 % give {', '.join(spans)} N m/rad."
+            f"{most(solved)} give {', '.join(spans)} N m/rad."
         )
         first = summary.measure_first
         if first is not None:

@@ -12,10 +12,10 @@ import numpy as np
 
 from pathwalker_cli.config.learnt import COST
 from pathwalker_cli.studies.uncertainty.result import (
-    ENOUGH,
     Spread,
     Uncertainty,
     chance_level,
+    most,
 )
 
 _OPEN: Final = 0.25
@@ -31,7 +31,6 @@ _K_D: Final = "dorsiflexion_stiffness_"
 def advice(result: Uncertainty) -> Iterator[str]:
     """Yield, of learnt numbers, which springs they leave open, and what to measure first."""
     rows, level = _measurable(result), _level(result)
-    most = "90 %" if len(result.converged) >= ENOUGH else "nearly all"
     for spread in _free(result) if rows else ():
         low, high = result.ranges[spread.measure.key]
         share = (spread.quantiles[2] - spread.quantiles[0]) / (high - low)
@@ -40,7 +39,7 @@ def advice(result: Uncertainty) -> Iterator[str]:
         text = (
             f"{spread.measure.label}: {'not determined' if share > _OPEN else found} by what was "
             f"learnt, {spread.quantiles[0]:.0f} to {spread.quantiles[2]:.0f} "
-            f"{spread.measure.unit} in {most} of the draws"
+            f"{spread.measure.unit} in {most(len(result.converged))} of the draws"
         )
         sizes = np.nan_to_num(np.abs(spread.correlations[rows]))
         if sizes.any():

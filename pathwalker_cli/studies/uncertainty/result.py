@@ -139,6 +139,11 @@ def span_words(draws: int) -> str:
     return "90 % of draws" if draws >= ENOUGH else f"range of {draws}"
 
 
+def most(draws: int) -> str:
+    """Return what of so many draws their quantiles of 5 and 95 % enclose, in words."""
+    return "90 %" if draws >= ENOUGH else "nearly all"
+
+
 def span_text(spread: Spread, values: np.ndarray, limits: tuple[float, float] | None) -> str:
     """Return the range of a measure; the one limit that holds all draws is named as such.
 
