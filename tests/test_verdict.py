@@ -269,7 +269,7 @@ def test_a_real_verdict_encloses_the_identified_springs() -> None:
     assert found is not None
     for spring in found.springs:
         low, high = spring.region
-        assert low - 1e-3 <= spring.stiffness <= high + 1e-3
+        assert low - 1e-3 <= spring.value <= high + 1e-3
         assert spring.certain
     assert found.snapped is not None
     assert found.snapped.status == "converged"
