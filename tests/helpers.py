@@ -14,6 +14,7 @@ from subprocess import CompletedProcess
 from tempfile import TemporaryFile
 
 import numpy as np
+import pinocchio as pin
 
 from pathwalker_cli.cli import main
 from pathwalker_cli.conventions import COORDINATES, GENERATORS, Condition
@@ -33,6 +34,18 @@ STIFFNESS = np.array([50.0, 60.0, 10.0, 20.0])
 GAIT = StylisedGait(walking_speed=0.6, stride_length=0.66)
 GUARD = 600
 """Time after which what is waited for will never happen [s]."""
+
+
+def energy_rate(walker: Walker, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> float:
+    """Return the rate of kinetic and potential energy [W] by differences along a motion."""
+    data, model, h = walker.model.createData(), walker.model, 1e-5
+
+    def energy(t: float) -> float:
+        there, speed = q + t * v + t * t / 2.0 * vdot, v + t * vdot
+        kinetic = pin.computeKineticEnergy(model, data, there, speed)
+        return float(kinetic + pin.computePotentialEnergy(model, data, there))
+
+    return (energy(h) - energy(-h)) / (2.0 * h)
 
 
 def called_apart(

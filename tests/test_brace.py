@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from figure_measure import complaints
-from helpers import stylised_series
+from helpers import energy_rate, stylised_series
 from pathwalker_cli.animation.drawing import drawing
 from pathwalker_cli.animation.frames import gait_frames
 from pathwalker_cli.animation.viewer import walker_geometry
@@ -241,14 +241,7 @@ def test_power_of_all_forces_is_the_change_of_energy(seed: int) -> None:
     vdot, force = walker.contact_dynamics(phase, q, v, tau)
     body, theta = walker.rigid_body, walker.rigid_body.parameters
     speeds = np.asarray(body.point_velocities(q, v, theta)).ravel()
-    data, model = walker.model.createData(), walker.model
-
-    def energy(h: float) -> float:
-        there, speed = q + h * v + h * h / 2.0 * vdot, v + h * vdot
-        kinetic = pin.computeKineticEnergy(model, data, there, speed)
-        return float(kinetic + pin.computePotentialEnergy(model, data, there))
-
-    change = (energy(1e-5) - energy(-1e-5)) / 2e-5
+    change = energy_rate(walker, q, v, vdot)
     assert change == pytest.approx(float(tau @ v + force @ speeds), rel=1e-5, abs=1e-3)
 
 

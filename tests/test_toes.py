@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 from figure_measure import complaints
+from helpers import energy_rate
 from pathwalker_cli.case import Case
 from pathwalker_cli.config import load_config, with_values
 from pathwalker_cli.conventions import SIDES, SUFFIX
@@ -143,15 +144,7 @@ def test_power_of_all_forces_is_the_change_of_energy(feet: Feet, seed: int) -> N
     vdot, force = walker.contact_dynamics(phase, q, v, tau)
     body, theta = walker.rigid_body, walker.rigid_body.parameters
     speeds = np.asarray(body.point_velocities(q, v, theta)).ravel()
-    data, model = walker.model.createData(), walker.model
-
-    def energy(h: float) -> float:
-        there, speed = q + h * v + h * h / 2.0 * vdot, v + h * vdot
-        kinetic = pin.computeKineticEnergy(model, data, there, speed)
-        return float(kinetic + pin.computePotentialEnergy(model, data, there))
-
-    h = 1e-5
-    change = (energy(h) - energy(-h)) / (2.0 * h)
+    change = energy_rate(walker, q, v, vdot)
     power = float(tau @ v + force @ speeds)
     assert change == pytest.approx(power, rel=1e-5, abs=1e-5 * np.abs(tau * v).sum())
 

@@ -13,7 +13,6 @@ from pathwalker_cli.case import Case
 from pathwalker_cli.config.learnt import Prior, config_values
 from pathwalker_cli.errors import NotConvergedError
 from pathwalker_cli.gait.resolve import Optimum, Resolver
-from pathwalker_cli.nlp.kkt import Answer
 from pathwalker_cli.ocp.violations import active_bounds
 from pathwalker_cli.stride.stride import Stride, stride_of
 from pathwalker_cli.studies.learn.targets import Target, residuals
@@ -32,7 +31,8 @@ class Learner:
     """Predictions for numbers, counted in prior standard deviations from their priors.
 
     The resolver solves neighbours of the first prediction, the journal keeps them under names that
-    begin with `name`; without `begin`, the first prediction is the one to begin with.
+    begin with `name`.  The next prediction begins at `begin`: the last one whose slopes were asked
+    for, or the optimum of the resolver.
     """
 
     numbers: Mapping[str, Prior]
@@ -46,7 +46,6 @@ class Learner:
     solves: int = 0
     iterations: int = 0
     _known: dict[bytes, Optimum] = field(default_factory=dict)
-    _at: tuple[np.ndarray, Optimum, list[Answer]] | None = None
 
     def values(self, deviations: np.ndarray) -> dict[str, float]:
         """Return the numbers by place [their units]."""
@@ -62,21 +61,11 @@ class Learner:
         key = deviations.tobytes()
         if key not in self._known:
             name = f"{self.name}-{len(self._known):03d}"
-            begin = self._extrapolated(deviations)
-            optimum = self.journal.resolve(name, self.case_at(deviations), begin, insist=False)
+            optimum = self.journal.resolve(name, self.case_at(deviations), self.begin, insist=False)
             self.solves += 1
             self.iterations += optimum.result.iterations
             self._known[key] = optimum
         return self._known[key]
-
-    def _extrapolated(self, deviations: np.ndarray) -> Optimum | None:
-        """Return where the derivatives at the last step say that the optimum is."""
-        if self._at is None:
-            return self.begin
-        last, optimum, answers = self._at
-        steps = zip(answers, deviations - last, strict=True)
-        unknowns = optimum.result.unknowns + sum(a.unknowns * step for a, step in steps)
-        return replace(optimum, result=replace(optimum.result, unknowns=unknowns))
 
     def misfit(self, deviations: np.ndarray) -> np.ndarray:
         """Return all deviations, of the walk and of the numbers; NaN where nothing was found."""
@@ -89,15 +78,14 @@ class Learner:
     def slopes(self, deviations: np.ndarray) -> np.ndarray:
         """Return the derivatives of `misfit` by all numbers."""
         optimum = self.optimum(deviations)
-        answers, columns = [], []
+        columns = []
         here = residuals(self.targets, stride_at(optimum))
         for step in _STEP * np.eye(deviations.size):
             end = self.resolver.restored(self.case_at(deviations + step), optimum.result)
             answer = optimum.kkt.answer(optimum.program, end.program, _STEP / 2.0)
             there = residuals(self.targets, stride_at(_moved(end, _STEP * answer.unknowns)))
-            answers.append(answer)
             columns.append((there - here) / _STEP)
-        self._at = deviations.copy(), optimum, answers
+        self.begin = optimum
         self._tell(deviations, optimum)
         return np.vstack([np.array(columns).T, np.eye(deviations.size)])
 
